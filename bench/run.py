@@ -1,0 +1,42 @@
+#!/usr/bin/python3
+"""./acopla bench: studies of accuracy and speed, each with its targets.
+
+    ./acopla bench --list
+    ./acopla bench NAME [--quick]
+
+A study writes docs/evidence/NAME.md, .csv and .svg and ends with `NAME: met M of N`; the exit code is 1 when a target is
+missed. --quick shrinks the problem, never a tolerance, and writes beside the build instead.
+"""
+import argparse
+import importlib
+import pathlib
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+
+from study import Study  # noqa: E402
+
+STUDIES = {
+    "box_fill": "spheres fill a steel box: tables 4-4 to 4-11 of Nasato (2011), conservation, cost of the search",
+    "dem_speed": "particle-steps per second on a settled bed against LAMMPS and LIGGGHTS, one core",
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="acopla bench", description="Studies of accuracy and speed.")
+    parser.add_argument("name", nargs="?", choices=sorted(STUDIES))
+    parser.add_argument("--list", action="store_true", help="the studies and what they are about")
+    parser.add_argument("--quick", action="store_true", help="a smaller problem with the same tolerances")
+    parser.add_argument("--build", default="build/release", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.list or not given.name:
+        for name, about in sorted(STUDIES.items()):
+            print(f"{name:12} {about}")
+        return 0 if given.list else 2
+    study = Study(given.name, STUDIES[given.name], pathlib.Path(given.build).resolve(), given.quick)
+    importlib.import_module(f"{given.name}_study").run(study)
+    return study.finish()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,27 @@
+# One set of compiler settings for the whole tree, carried by the interface target acopla::settings.
+add_library(acopla_settings INTERFACE)
+add_library(acopla::settings ALIAS acopla_settings)
+target_include_directories(acopla_settings INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(acopla_settings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor)
+if(ACOPLA_WERROR)
+  target_compile_options(acopla_settings INTERFACE -Werror)
+endif()
+if(ACOPLA_MARCH STREQUAL "native")
+  target_compile_options(acopla_settings INTERFACE -march=native)
+endif()
+if(ACOPLA_SANITIZE)
+  target_compile_options(acopla_settings INTERFACE -fsanitize=${ACOPLA_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(acopla_settings INTERFACE -fsanitize=${ACOPLA_SANITIZE})
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+# A library of one folder: acopla_library(NAME sources...) makes acopla::NAME.
+function(acopla_library name)
+  add_library(acopla_${name} STATIC ${ARGN})
+  add_library(acopla::${name} ALIAS acopla_${name})
+  target_link_libraries(acopla_${name} PUBLIC acopla::settings)
+endfunction()

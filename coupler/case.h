@@ -1,0 +1,99 @@
+// What the coupler reads of a case: who takes part, which surfaces meet, over which windows, and what is expected.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/surface_mesh.h"
+#include "io/case_table.h"
+
+namespace acopla::coupler {
+
+/// A surface by its owner, written "grains.box".
+struct SurfaceName {
+  std::string participant, surface;
+  std::string text() const { return participant + "." + surface; }
+  bool operator==(const SurfaceName&) const = default;
+};
+
+/// [[coupling.interface]]: forces go from one surface to another.
+struct InterfaceCase {
+  SurfaceName from, to;
+  io::Location at, from_at, to_at;
+  std::string text() const { return from.text() + " to " + to.text(); }
+};
+
+/// A recorded participant plays instead of a live one.
+struct ReplayCase {
+  std::string file;                ///< an interface.h5; absolute, or as given on a command line
+  std::string of;                  ///< its name in the record; empty: its own, or the only one recorded
+  std::optional<double> from, to;  ///< part of the record that is played [s]; default all of it
+  double at = 0;                   ///< time of this run at which `from` is played [s]
+};
+
+struct ParticipantCase {
+  std::string name;
+  std::string solver;                ///< "dem" means acopla-dem; empty for the other two sorts
+  std::vector<std::string> command;  ///< any program that speaks the protocol
+  std::optional<ReplayCase> replay;
+  std::optional<double> advance_limit;  ///< longest time without an answer [s]
+  io::Location at;
+  /// The executable, for messages: "acopla-dem", "python3", "a record".
+  std::string program() const;
+};
+
+enum class Loads { history, mean, snapshot };
+
+struct LedgerLimits {
+  double force_loss = 1e-12;
+  double moment_loss = 1e-12;
+  std::int64_t unmapped = 0;
+};
+
+/// "participant.quantity" = { value, relative | absolute, … } of [expect].
+struct Expectation {
+  std::string name;
+  double value = 0, tolerance = 0;
+  bool relative = true;
+  double mean_over = 0;  ///< [s]; 0: one window
+  double at = 0;         ///< [s]
+  std::string source;
+  io::Location where;
+};
+
+struct Case {
+  std::string file, title;
+  int dimension = 3;
+  geometry::Vec3 gravity = geometry::Vec3::Zero();
+  double end = 0, window = 0;  ///< [s]
+  std::int64_t windows = 0;
+  Loads loads = Loads::history;
+  std::int64_t loads_from = 0;      ///< first window that receivers are given (history)
+  std::int64_t load_start = 0;      ///< windows [load_start, load_end) of a mean or snapshot
+  std::int64_t load_end = 0;
+  double max_distance = 0;          ///< [m]
+  double start_limit = 60;          ///< [s]
+  std::int64_t output_every = 1;    ///< windows between pictures
+  LedgerLimits limits;
+  std::vector<InterfaceCase> interfaces;
+  std::vector<ParticipantCase> participants;
+  std::vector<Expectation> expectations;
+
+  double time(std::int64_t windows_done) const { return static_cast<double>(windows_done) * window; }
+  const ParticipantCase* find(const std::string& participant) const;
+  bool sends(const std::string& participant) const;
+  bool receives(const std::string& participant) const;
+};
+
+/// A participant that a record replaces, whatever its table says (`acopla replay`).
+struct Substitute {
+  std::string participant;  ///< empty: the only one that sends
+  ReplayCase replay;
+};
+
+/// Reads everything but the participants' own keys, which their solvers check. @throws io::UserError, located
+Case read_case(const io::Table& root, const std::optional<Substitute>& substitute = {});
+
+}  // namespace acopla::coupler

@@ -1,0 +1,104 @@
+#include "coupler/coupler.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <optional>
+
+#include "coupler/crew.h"
+#include "coupler/failure.h"
+#include "coupler/one_way.h"
+#include "coupler/quantities.h"
+#include "coupler/record.h"
+#include "io/results.h"
+
+namespace acopla::coupler {
+namespace {
+
+// The stages of a run, kept so that a failure in any of them still finds what the others came to.
+struct Stages {
+  Quantities quantities;
+  std::optional<Record> record;
+  std::optional<OneWay> scheme;
+};
+
+void compute(const Case& read, Crew& crew, const std::string& results, Reporter& reporter, Stages& stages,
+             std::chrono::steady_clock::time_point begin) {
+  crew.assemble();
+  stages.record.emplace(read, results);
+  stages.scheme.emplace(read, crew, *stages.record, stages.quantities, reporter);
+  reporter.assembled(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  stages.scheme->run();
+  for (const auto& [name, value] : crew.finish()) stages.quantities.add(name, read.end, value);
+}
+
+void note_error(Outcome& outcome, Status status, int exit_code, Outcome::Error error) {
+  outcome.status = status;
+  outcome.exit_code = exit_code;
+  outcome.error = std::move(error);
+}
+
+int exit_code_of(Failure::Cause cause) {
+  return cause == Failure::Cause::limit     ? io::exit_missed
+         : cause == Failure::Cause::mistake ? io::exit_user_error
+                                            : io::exit_failure;
+}
+
+// Runs the stages and turns whatever ends them early into words.
+void attempt(const Case& read, Crew& crew, const std::string& results, Reporter& reporter, Stages& stages,
+             std::chrono::steady_clock::time_point begin, Outcome& outcome) {
+  try {
+    compute(read, crew, results, reporter, stages, begin);
+    outcome.status = Status::met;
+    outcome.exit_code = io::exit_done;
+  } catch (const Interrupted& interrupted) {
+    note_error(outcome, Status::interrupted, io::exit_interrupted, {"coupler", "running", interrupted.what()});
+  } catch (const Failure& failure) {
+    note_error(outcome, Status::failed, exit_code_of(failure.cause()), {failure.participant(), failure.state(), failure.what()});
+  } catch (const io::UserError& error) {
+    note_error(outcome, Status::failed, io::exit_user_error, {"coupler", "starting", error.what()});
+  } catch (const std::exception& error) {
+    note_error(outcome, Status::failed, io::exit_failure,
+               {"coupler", "running", fmt::format("the coupler failed: {}", error.what())});
+  }
+  if (outcome.error) crew.dismiss(outcome.error->message);
+}
+
+void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& outcome) {
+  outcome.title = read.title;
+  outcome.end = read.end;
+  outcome.participants = crew.outcomes();
+  outcome.quantities = stages.quantities.last();
+  if (stages.scheme) {
+    outcome.windows = stages.scheme->complete();
+    outcome.reached = outcome.windows == read.windows ? read.end : read.time(outcome.windows);
+    outcome.ledgers = stages.scheme->ledgers();
+    outcome.interfaces = stages.scheme->interfaces();
+  }
+  for (const auto& expectation : read.expectations) outcome.expectations.push_back(stages.quantities.check(expectation));
+  if (outcome.status != Status::met) return;
+  for (const auto& checked : outcome.expectations)
+    if (!checked.met) {
+      outcome.status = Status::missed;
+      outcome.exit_code = io::exit_missed;
+    }
+}
+
+}  // namespace
+
+Outcome Coupler::run() {
+  const auto begin = std::chrono::steady_clock::now();
+  Crew crew(context_, options_.endpoint, case_, options_.results, reporter_, options_.outside);
+  Outcome outcome;
+  {
+    Stages stages;
+    attempt(case_, crew, options_.results, reporter_, stages, begin, outcome);
+    gather(case_, crew, stages, outcome);
+  }  // the series are closed before the summary says that they are there
+  outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (!options_.results.empty()) io::write_whole(options_.results + "/summary.json", summary_text(outcome));
+  reporter_.done(outcome);
+  return outcome;
+}
+
+}  // namespace acopla::coupler

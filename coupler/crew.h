@@ -1,0 +1,102 @@
+// The participants as the coupler sees them: who is there, what each is doing, and whether it still lives.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+#include <zmq.hpp>
+
+#include "coupler/case.h"
+#include "coupler/outcome.h"
+#include "coupler/outside.h"
+#include "coupler/replay.h"
+#include "coupler/reporter.h"
+#include "protocol/hub.h"
+#include "protocol/participant.h"
+#include "protocol/pulse.h"
+
+namespace acopla::coupler {
+
+/// The coupler's half of the state machine (docs/protocol.md, §3). Whatever a participant does wrong, and whatever
+/// befalls it, ends in a Failure that names it and its state; whatever a stranger does is answered and noted.
+class Crew {
+ public:
+  /// Binds the hub and the pulse. @param outside may be null. @throws io::UserError when the address is taken
+  Crew(zmq::context_t& context, const std::string& endpoint, const Case& read, const std::string& results,
+       Reporter& reporter, Outside* outside);
+
+  /// Waits until everybody said hello and sent its surfaces. @throws Failure, Interrupted
+  void assemble();
+  /// A surface of a participant, once assembled. @throws io::UserError located at `asked_at` when it has none such
+  const geometry::SurfaceMesh& surface(const SurfaceName& name, const io::Location& asked_at) const;
+
+  /// Asks a participant, which must be idle, for the windows [start, end).
+  void begin_advance(const std::string& participant, std::int64_t start, std::int64_t end,
+                     std::vector<protocol::Field> fields);
+  struct Answer {
+    std::string participant;
+    protocol::Advance advance;
+  };
+  /// The next answer of anybody. @throws Failure, Interrupted
+  Answer next_answer();
+
+  /// Ends the run well. @return what the participants report at the end, as "participant.quantity"
+  std::vector<std::pair<std::string, double>> finish();
+  /// Tells everybody that the run is over and why; never throws.
+  void dismiss(const std::string& why) noexcept;
+
+  std::vector<ParticipantOutcome> outcomes() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  struct Member {
+    const ParticipantCase* about = nullptr;
+    std::unique_ptr<Replay> replay;  // plays here instead of a process
+    std::string peer;                // address, once it said hello
+    enum class Phase { absent, starting, idle, advancing, finishing, finished } phase = Phase::absent;
+    std::string state = "not connected";
+    std::uint64_t sequence = 0;
+    std::map<std::string, geometry::SurfaceMesh> surfaces;
+    Clock::time_point since;  // of the phase
+    ParticipantOutcome outcome;
+  };
+
+  void turn(std::chrono::milliseconds wait);
+  void hear(protocol::Arrival arrival);
+  void hear_member(Member& member, const protocol::Message& message);
+  void hear_stranger(const protocol::Arrival& arrival);
+  void admit(const std::string& peer, const protocol::Message& message);
+  void refuse(const std::string& peer, const std::string& why);
+  void take_surfaces(Member& member, std::vector<protocol::Surface> surfaces);
+  void take_advance(Member& member, protocol::Advance advance);
+  void take_end(Member& member, const protocol::Message& message);
+  void heed(const Notice& notice);
+  void hear_last_words(const std::string& peer);
+  void check_health();
+  void enter(Member& member, Member::Phase phase, const std::string& state);
+  void request(Member& member, protocol::Message message);
+  void start_replay(Member& member);
+  protocol::Run run_for(const ParticipantCase& participant) const;
+  Member* with_peer(const std::string& peer);
+  bool all_are(Member::Phase phase) const;
+  [[noreturn]] void fail(const Member& member, const std::string& message) const;
+
+  const Case& case_;
+  std::string results_;
+  Reporter& reporter_;
+  Outside* outside_;
+  protocol::Hub hub_;
+  protocol::PulseMonitor pulse_;
+  std::map<std::string, Member> members_;
+  std::deque<Answer> answers_;
+  std::vector<std::pair<std::string, double>> last_values_;
+  Clock::time_point begin_;
+  int notes_left_ = 50;  // a stranger must not fill the disk with our log
+};
+
+}  // namespace acopla::coupler

@@ -1,0 +1,76 @@
+#include "coupler/record.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+namespace acopla::coupler {
+
+using geometry::Vec3;
+
+Record::Record(const Case& read, const std::string& folder)
+    : case_(read), folder_(folder), mapping_(read.interfaces.size(), {0, 0.0}) {
+  if (folder_.empty()) return;
+  std::filesystem::create_directories(folder_ + "/surfaces");
+  series_ = std::make_unique<io::SeriesWriter>(folder_ + "/interface.h5");
+}
+
+void Record::add_surface(const std::string& name, const geometry::SurfaceMesh& mesh) {
+  if (!series_ || surfaces_.count(name)) return;
+  series_->add_surface(name, mesh);
+  surfaces_.emplace(name, mesh);
+  pictures_.emplace(name, io::PvdSeries(fmt::format("{}/{}.pvd", folder_, name)));
+}
+
+void Record::set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance) {
+  mapping_[interface] = {unmapped, worst_distance};
+}
+
+void Record::write(std::int64_t index, const WindowRecord& window) {
+  if (!series_) return;
+  series_->begin_window(case_.time(index), case_.time(index + 1));
+  for (const auto& [name, force] : window.forces) series_->add_field(name, "force", force);
+  for (const auto& [name, value] : window.quantities) series_->add_scalar("quantities/" + name, value);
+  write_ledger(window);
+  series_->flush();
+  const auto complete = index + 1;
+  if (complete % case_.output_every == 0 || complete == case_.windows)
+    for (const auto& [name, force] : window.forces) write_picture(index, name, force);
+}
+
+void Record::write_ledger(const WindowRecord& window) {
+  double force_loss = 0, moment_loss = 0, worst_distance = 0;
+  std::size_t unmapped = 0;
+  for (std::size_t k = 0; k < window.ledger.size(); ++k) {
+    const auto& row = window.ledger[k];
+    const auto name = fmt::format("ledger/{}/", case_.interfaces[k].text());
+    for (int d = 0; d < 3; ++d) {
+      series_->add_scalar(fmt::format("{}sent.force.{}", name, "xyz"[d]), row.sent.force[d]);
+      series_->add_scalar(fmt::format("{}received.force.{}", name, "xyz"[d]), row.received.force[d]);
+      series_->add_scalar(fmt::format("{}sent.moment.{}", name, "xyz"[d]), row.sent.moment[d]);
+      series_->add_scalar(fmt::format("{}received.moment.{}", name, "xyz"[d]), row.received.moment[d]);
+    }
+    series_->add_scalar(name + "force_loss", row.loss.force);
+    series_->add_scalar(name + "moment_loss", row.loss.moment);
+    force_loss = std::max(force_loss, row.loss.force);
+    moment_loss = std::max(moment_loss, row.loss.moment);
+    unmapped += mapping_[k].first;
+    worst_distance = std::max(worst_distance, mapping_[k].second);
+  }
+  series_->add_scalar("ledger/force_loss", force_loss);
+  series_->add_scalar("ledger/moment_loss", moment_loss);
+  series_->add_scalar("ledger/unmapped", static_cast<double>(unmapped));
+  series_->add_scalar("ledger/worst_distance", worst_distance);
+  series_->add_scalar("ledger/energy_made", 0);
+}
+
+void Record::write_picture(std::int64_t index, const std::string& surface, const std::vector<Vec3>& force) {
+  io::PointData data{"force", 3, {}};
+  for (const auto& f : force) data.values.insert(data.values.end(), f.data(), f.data() + 3);
+  const auto file = fmt::format("{}/surfaces/{}_{:05}.vtp", folder_, surface, index + 1);
+  io::write_surface(file, surfaces_.at(surface), {data});
+  pictures_.at(surface).add(case_.time(index + 1), file);
+}
+
+}  // namespace acopla::coupler

@@ -1,0 +1,52 @@
+// What a run leaves behind: interface.h5, which can be replayed, and pictures of the loaded surfaces.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coupler/mapping/balance.h"
+#include "coupler/case.h"
+#include "io/series.h"
+#include "io/vtk.h"
+
+namespace acopla::coupler {
+
+/// One window of one interface: what went in and what came out.
+struct LedgerRow {
+  Resultant sent, received;  ///< about the centroid of the sending surface
+  Loss loss;
+};
+
+/// Everything of one window, gathered until all participants are through it.
+struct WindowRecord {
+  std::vector<LedgerRow> ledger;                                      ///< one per interface of the case
+  std::map<std::string, std::vector<geometry::Vec3>> forces;          ///< "grains.box" → one per point [N]
+  std::vector<std::pair<std::string, double>> quantities;             ///< "participant.quantity"
+};
+
+class Record {
+ public:
+  /// Writes into `folder`, or nothing at all where it is empty. @throws io::UserError
+  Record(const Case& read, const std::string& folder);
+  void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);
+  /// What does not change: points without a partner, the farthest of those with one.
+  void set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance);
+  /// Appends window `index`, which must follow the last one, and flushes.
+  void write(std::int64_t index, const WindowRecord& window);
+
+ private:
+  void write_ledger(const WindowRecord& window);
+  void write_picture(std::int64_t index, const std::string& surface, const std::vector<geometry::Vec3>& force);
+
+  const Case& case_;
+  std::string folder_;
+  std::unique_ptr<io::SeriesWriter> series_;
+  std::map<std::string, geometry::SurfaceMesh> surfaces_;
+  std::map<std::string, io::PvdSeries> pictures_;
+  std::vector<std::pair<std::size_t, double>> mapping_;  // per interface
+};
+
+}  // namespace acopla::coupler

@@ -1,0 +1,104 @@
+#include "dem/explain.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "dem/contact/restitution.h"
+#include "dem/engine.h"
+#include "dem/step.h"
+
+namespace acopla::dem {
+namespace {
+
+// Seconds a particle-step of this scene's kernel, measured on a cubic lattice that touches its six neighbours: about
+// the number of contacts of a settled bed.
+double measure_particle_step(const Scene& scene, double step) {
+  const auto& first = scene.insertions.front();
+  const auto side = static_cast<int>(std::ceil(std::cbrt(std::min<double>(8000, static_cast<double>(scene.particle_count())))));
+  Scene trial = scene;
+  trial.walls.clear();
+  trial.domain.reset();
+  trial.gravity.setZero();
+  Particles particles;
+  particles.rotates = rotates(scene.laws);
+  const double spacing = 2 * first.radius * (1 - 1e-4);
+  for (int z = 0; z < side; ++z)
+    for (int y = 0; y < side; ++y)
+      for (int x = 0; x < side; ++x)
+        particles.add(Vec3(x, y, z) * spacing, first.radius, scene.materials[first.material].density, first.material, Vec3::Zero());
+  const auto count = static_cast<double>(particles.size());
+  const auto engine = make_engine(trial, std::move(particles));
+  engine->advance(2, step * 1e-3);
+  const auto begin = std::chrono::steady_clock::now();
+  constexpr int steps = 40;
+  engine->advance(steps, step * 1e-3);
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / (steps * count);
+}
+
+std::string left_out(const Scene& scene, std::size_t meshes, std::size_t planes) {
+  std::vector<std::string> out;
+  if (scene.laws.tangential == "none") out.emplace_back("friction and its history");
+  if (scene.laws.rolling == "none") out.emplace_back("rolling resistance");
+  if (!rotates(scene.laws)) out.emplace_back("rotation");
+  if (meshes == 0) out.emplace_back("triangle walls");
+  if (planes == 0) out.emplace_back("planes");
+  out.insert(out.end(), {"bonds", "moving walls", "global damping", "checkpoints"});
+  return fmt::format("{}", fmt::join(out, ", "));
+}
+
+}  // namespace
+
+std::string explain(const io::Table& root, const std::string& name) {
+  const auto scene = read_scene(root, name);
+  const double limit = largest_step(scene, root.table(name));
+  const auto critical = critical_step(scene);
+  const double end = root.number("end", io::positive);
+  const auto coupling = root.table_or_empty("coupling");
+  const double window = coupling.is_number("window") ? coupling.number("window", io::positive) : end;
+  const double steps_a_window = std::ceil(window / limit * (1 - 1e-12)), step = window / steps_a_window;
+  const double steps = steps_a_window * std::round(end / window);
+  const auto count = static_cast<double>(scene.particle_count());
+
+  std::size_t meshes = 0, planes = 0, triangles = 0;
+  for (const auto& wall : scene.walls) {
+    (wall.is_plane ? planes : meshes) += 1;
+    triangles += wall.mesh.triangles.size();
+  }
+  Particles none;
+  none.rotates = rotates(scene.laws);
+  const auto costs = make_engine(scene, none)->costs();
+  const double seconds = measure_particle_step(scene, step) * count * steps;
+
+  std::string text;
+  const auto line = [&](const char* what, const std::string& value) { text += fmt::format("  {:22} {}\n", what, value); };
+  line("particles", fmt::format("{} spheres", scene.particle_count()));
+  line("laws", scene.laws.text());
+  line("walls", fmt::format("{} mesh(es) of {} triangles, {} plane(s)", meshes, triangles, planes));
+  line("left out", left_out(scene, meshes, planes));
+  line("bytes a particle", fmt::format("{}", costs.bytes_per_particle));
+  line("bytes a contact", fmt::format("{}", costs.bytes_per_contact));
+  line("critical step", fmt::format("{:.4g} s ({})", critical.seconds, critical.reason));
+  line("step", fmt::format("{:.4g} s, {:.2f} of critical; {:.0f} a window, {:.0f} in all", step, step / critical.seconds, steps_a_window, steps));
+  for (const auto i : scene.particle_materials())
+    for (std::size_t j = 0; j < scene.materials.size(); ++j) {
+      const auto& pair = scene.pair(i, j);
+      if (pair.modulus == 0 && pair.stiffness == 0) continue;
+      const bool hertz = scene.laws.normal == "hertz";
+      const auto& shape = hertz ? hertz_impact : linear_impact;
+      const double alpha = hertz ? pair.hertz_damping * std::sqrt(1.5) : 2 * pair.damping_ratio;
+      // A gentle impact: 1 m/s between spheres of the first insertion, in units of that impact.
+      const double radius = scene.insertions.front().radius / 2;
+      const double mass = scene.materials[i].density * 2.0 / 3.0 * M_PI * std::pow(2 * radius, 3);
+      const double unit = hertz ? std::pow(mass / (4.0 / 3.0 * pair.modulus * std::sqrt(radius)), 0.4) : std::sqrt(mass / pair.stiffness);
+      const double got = integrated_restitution(shape, alpha, step / unit);
+      line("restitution", fmt::format("{}–{}: {:.3f} asked, {:.4f} at this step in an impact of 1 m/s (error {:+.4f})", scene.materials[i].name,
+                                      scene.materials[j].name, pair.restitution, got, got - pair.restitution));
+    }
+  line("expected run time", fmt::format("{:.3g} s on one core", seconds));
+  return text;
+}
+
+}  // namespace acopla::dem

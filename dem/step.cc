@@ -1,0 +1,42 @@
+#include "dem/step.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+namespace acopla::dem {
+
+CriticalStep critical_step(const Scene& scene) {
+  CriticalStep critical{std::numeric_limits<double>::infinity(), ""};
+  const auto consider = [&](double seconds, std::string reason) {
+    if (seconds < critical.seconds) critical = {seconds, std::move(reason)};
+  };
+  for (const auto& insertion : scene.insertions) {
+    const auto& material = scene.materials[insertion.material];
+    if (material.shear_modulus > 0)
+      consider(M_PI * insertion.radius * std::sqrt(material.density / material.shear_modulus) / (0.1631 * material.poisson + 0.8766),
+               fmt::format("Rayleigh time of {} spheres of {:.4g} m", material.name, 2 * insertion.radius));
+    const double mass = material.density * 4.0 / 3.0 * M_PI * std::pow(insertion.radius, 3);
+    for (std::size_t other = 0; other < scene.materials.size(); ++other) {
+      const auto& pair = scene.pair(insertion.material, other);
+      if (pair.stiffness <= 0) continue;
+      constexpr double contacts = 12;
+      const double omega = std::sqrt(2 * contacts * pair.stiffness / (3 * mass));
+      consider(2 / omega * (std::sqrt(1 + pair.damping_ratio * pair.damping_ratio) - pair.damping_ratio),
+               fmt::format("springs of {} spheres of {:.4g} m against {}", material.name, 2 * insertion.radius, scene.materials[other].name));
+    }
+  }
+  return critical;
+}
+
+double largest_step(const Scene& scene, const io::Table& table) {
+  const auto critical = critical_step(scene);
+  if (!scene.step) return scene.step_fraction * critical.seconds;
+  if (*scene.step > critical.seconds && !scene.allow_unstable_step)
+    table.fail("step", fmt::format("= {:.4g} s is above the critical step of {:.4g} s ({}). Use at most {:.4g} s, or say "
+                                   "allow_unstable_step = true.", *scene.step, critical.seconds, critical.reason, 0.2 * critical.seconds));
+  return *scene.step;
+}
+
+}  // namespace acopla::dem

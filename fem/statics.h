@@ -1,0 +1,46 @@
+// A supported elastic body and its response to loads that do not depend on time.
+#pragma once
+
+#include "fem/elasticity.h"
+#include "fem/linear_solver.h"
+
+namespace acopla::fem {
+
+struct StaticSolution {
+  Vector displacement;  ///< u [m], 0 at held unknowns
+  /// K u − f [N] at held unknowns, the force of the supports on the body; 0 at free ones.
+  Vector reaction;
+  /// |K u − f| / (|K| |u| + |f|) at free unknowns: the backward error in the maximum norm.
+  double residual = 0;
+  Vec3 total_reaction() const;  ///< [N]
+};
+
+/// Sum of nodal forces [N].
+Vec3 total(const Vector& nodal);
+
+class Statics {
+ public:
+  /// Assembles the stiffness and analyses it; prepare() does the rest.
+  /// @param mesh, fixed  must outlive this
+  Statics(const Mesh& mesh, const Material& material, const Fixed& fixed,
+          const SolverOptions& options);
+
+  /// Factors, or builds the preconditioner.
+  void prepare() { chosen_.solver->prepare(); }
+  /// @param load   nodal forces f [N], on held unknowns as well: these go straight to the supports
+  /// @param guess  displacements to start iterations from; may be empty
+  StaticSolution solve(const Vector& load, const Vector& guess = {}) const;
+
+  const BlockMatrix& stiffness() const { return stiffness_; }
+  const ChosenSolver& solver() const { return chosen_; }
+
+ private:
+  double free_residual(const Vector& residual) const;
+
+  const Fixed& fixed_;
+  BlockMatrix stiffness_;
+  double norm_;
+  ChosenSolver chosen_;
+};
+
+}  // namespace acopla::fem

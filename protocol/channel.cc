@@ -1,0 +1,94 @@
+#include "protocol/channel.h"
+
+#include <fmt/format.h>
+
+#include "io/error.h"
+
+namespace acopla::protocol {
+
+void check_endpoint(const std::string& endpoint) {
+  if (endpoint.starts_with("ipc://") || endpoint.starts_with("inproc://")) {
+    constexpr std::size_t longest = 107;  // sockaddr_un
+    if (endpoint.starts_with("ipc://") && endpoint.size() - 6 > longest)
+      throw io::UserError(fmt::format("{}: a socket's path may have {} characters. Choose a shorter folder.", endpoint, longest));
+    return;
+  }
+  if (!endpoint.starts_with("tcp://"))
+    throw io::UserError(fmt::format("{}: not an endpoint. Use ipc:///PATH or tcp://127.0.0.1:PORT.", endpoint));
+  const auto host = endpoint.substr(6, endpoint.rfind(':') - 6);
+  if (host != "127.0.0.1" && host != "localhost" && host != "[::1]")
+    throw io::UserError(fmt::format("{}: tcp is open to loopback only, because messages are neither signed nor "
+                                    "encrypted. Use tcp://127.0.0.1:PORT.", endpoint));
+}
+
+bool send(zmq::socket_t& socket, const Message& message, const std::string& identity) {
+  try {
+    if (!identity.empty()) socket.send(zmq::buffer(identity), zmq::send_flags::sndmore);
+    const auto header = encode_header(message);
+    const auto more = [](bool yes) { return yes ? zmq::send_flags::sndmore : zmq::send_flags::none; };
+    socket.send(zmq::buffer(header), more(!message.arrays.empty()));
+    for (std::size_t k = 0; k < message.arrays.size(); ++k) {
+      const auto& array = message.arrays[k];
+      // ZeroMQ frees the frame from its own thread; the shared owner makes that safe.
+      auto* keep = new std::shared_ptr<const void>(array.owner());
+      zmq::message_t frame(const_cast<std::byte*>(array.bytes().data()), array.bytes().size(),
+                           [](void*, void* hint) { delete static_cast<std::shared_ptr<const void>*>(hint); }, keep);
+      socket.send(frame, more(k + 1 < message.arrays.size()));
+    }
+    return true;
+  } catch (const zmq::error_t& error) {
+    if (error.num() == EHOSTUNREACH || error.num() == EAGAIN) return false;
+    throw;
+  }
+}
+
+std::optional<Parcel> receive_parcel(zmq::socket_t& socket, std::chrono::milliseconds wait, bool has_identity) {
+  zmq::pollitem_t item{socket.handle(), 0, ZMQ_POLLIN, 0};
+  try {
+    if (zmq::poll(&item, 1, wait) == 0) return std::nullopt;
+  } catch (const zmq::error_t& error) {
+    if (error.num() == EINTR) return std::nullopt;  // a signal: the caller looks at its flags and comes back
+    throw;
+  }
+  Parcel parcel;
+  bool first = has_identity;
+  for (bool more = true; more;) {
+    auto part = std::make_shared<zmq::message_t>();
+    while (true) {
+      try {
+        if (!socket.recv(*part, zmq::recv_flags::none)) return std::nullopt;
+        break;
+      } catch (const zmq::error_t& error) {
+        if (error.num() != EINTR) throw;
+      }
+    }
+    more = part->more();
+    if (std::exchange(first, false)) {
+      parcel.identity = part->to_string();
+      continue;
+    }
+    const auto* data = static_cast<const std::byte*>(part->data());
+    const auto size = part->size();
+    parcel.frames.push_back({std::move(part), data, size});
+  }
+  return parcel;
+}
+
+Channel::Channel(zmq::context_t& context, const std::string& endpoint) : socket_(context, zmq::socket_type::dealer) {
+  check_endpoint(endpoint);
+  socket_.set(zmq::sockopt::linger, 2000);  // last words reach the coupler
+  socket_.set(zmq::sockopt::reconnect_ivl, 20);  // ms; the coupler may bind after we connect
+  socket_.set(zmq::sockopt::sndhwm, 0);
+  socket_.set(zmq::sockopt::rcvhwm, 0);
+  socket_.connect(endpoint);
+}
+
+void Channel::send(const Message& message) { protocol::send(socket_, message); }
+
+std::optional<Message> Channel::receive(std::chrono::milliseconds wait) {
+  const auto parcel = receive_parcel(socket_, wait, false);
+  if (!parcel) return std::nullopt;
+  return decode(parcel->frames);
+}
+
+}  // namespace acopla::protocol

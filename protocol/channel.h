@@ -1,0 +1,40 @@
+// A message over a ZeroMQ socket, and the solver's end of the connection.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <zmq.hpp>
+
+#include "protocol/codec.h"
+
+namespace acopla::protocol {
+
+/// @throws io::UserError for an address that is none, or a tcp address beyond loopback (CURVE keys are not there yet)
+void check_endpoint(const std::string& endpoint);
+
+/// Sends a message, its arrays without a copy. `identity` addresses a peer of a ROUTER; empty for other sockets.
+/// @return false when the peer is gone
+bool send(zmq::socket_t& socket, const Message& message, const std::string& identity = {});
+
+/// Frames of one message as they arrived, header first; the identity frame of a ROUTER is split off.
+struct Parcel {
+  std::string identity;
+  std::vector<Frame> frames;
+};
+/// @return nothing when no message came within the time
+std::optional<Parcel> receive_parcel(zmq::socket_t& socket, std::chrono::milliseconds wait, bool has_identity);
+
+/// The solver's end: a DEALER.
+class Channel {
+ public:
+  Channel(zmq::context_t& context, const std::string& endpoint);
+  void send(const Message& message);
+  /// @throws ProtocolError when what came is not a message
+  std::optional<Message> receive(std::chrono::milliseconds wait);
+
+ private:
+  zmq::socket_t socket_;
+};
+
+}  // namespace acopla::protocol

@@ -1,0 +1,245 @@
+#include "protocol/exchange.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+namespace acopla::protocol {
+namespace {
+
+using geometry::Vec3;
+
+// JSON would narrow a count without a word.
+template <class T>
+bool fits(const Body& value) {
+  if (value.is_number_unsigned()) return std::in_range<T>(value.get<std::uint64_t>());
+  return value.is_number_integer() && std::in_range<T>(value.get<std::int64_t>());
+}
+
+// Reads a value of a body, and says which is missing or of the wrong type.
+template <class T>
+T value(const Message& message, const Body& body, const char* key) {
+  const auto found = body.find(key);
+  try {
+    if (found == body.end()) throw ProtocolError(fmt::format("{} lacks \"{}\"", name_of(message.kind), key));
+    if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>)
+      if (!fits<T>(*found)) throw ProtocolError(fmt::format("\"{}\" of {} is not an integer in range", key, name_of(message.kind)));
+    return found->template get<T>();
+  } catch (const nlohmann::json::exception&) {
+    throw ProtocolError(fmt::format("\"{}\" of {} is of the wrong type", key, name_of(message.kind)));
+  }
+}
+
+Array vectors(const std::string& name, const std::string& mesh, const std::vector<Vec3>& values) {
+  std::vector<double> flat(3 * values.size());
+  for (std::size_t k = 0; k < values.size(); ++k)
+    for (int d = 0; d < 3; ++d) flat[3 * k + static_cast<std::size_t>(d)] = values[k][d];
+  return Array::of(name, mesh, {values.size(), 3}, std::move(flat));
+}
+
+std::vector<Vec3> vectors(const Array& array) {
+  if (array.shape().size() != 2 || array.shape()[1] != 3)
+    throw ProtocolError(fmt::format("array {} on {} must have the shape [points, 3]", array.name(), array.mesh()));
+  const auto flat = array.doubles();
+  std::vector<Vec3> values(flat.size() / 3);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    values[k] = Vec3(flat[3 * k], flat[3 * k + 1], flat[3 * k + 2]);
+    if (!values[k].allFinite())
+      throw ProtocolError(fmt::format("{} on {} is not finite at point {}", array.name(), array.mesh(), k));
+  }
+  return values;
+}
+
+std::vector<Field> read_fields(const Message& message) {
+  std::vector<Field> fields;
+  for (const auto& array : message.arrays) fields.push_back({array.mesh(), array.name(), vectors(array)});
+  return fields;
+}
+
+const Array& array(const Message& message, const char* name, const std::string& mesh) {
+  const auto* found = message.find(name, mesh);
+  if (!found) throw ProtocolError(fmt::format("interface lacks the array {} of surface {}", name, mesh));
+  return *found;
+}
+
+}  // namespace
+
+Message hello_message(const std::string& participant, const Introduction& introduction) {
+  Message message;
+  message.kind = Kind::hello;
+  message.body = {{"participant", participant},
+                  {"solver", introduction.solver},
+                  {"dimension", introduction.dimension},
+                  {"versions", {version, version}},
+                  {"capabilities", introduction.capabilities}};
+  return message;
+}
+
+Hello read_hello(const Message& message) {
+  Hello hello;
+  hello.participant = value<std::string>(message, message.body, "participant");
+  hello.introduction.solver = value<std::string>(message, message.body, "solver");
+  hello.introduction.dimension = value<int>(message, message.body, "dimension");
+  hello.introduction.capabilities = value<std::vector<std::string>>(message, message.body, "capabilities");
+  const auto versions = value<Body>(message, message.body, "versions");
+  if (!versions.is_array() || versions.size() != 2 || !fits<std::uint64_t>(versions[0]) || !fits<std::uint64_t>(versions[1]))
+    throw ProtocolError("\"versions\" of hello must be [lowest, highest]");
+  hello.version_low = versions[0].get<std::uint64_t>();
+  hello.version_high = versions[1].get<std::uint64_t>();
+  return hello;
+}
+
+Message welcome_message(const Run& run, const std::string& pulse_endpoint) {
+  Message message;
+  message.kind = Kind::welcome;
+  Body uses = Body::array();
+  for (const auto& use : run.uses)
+    uses.push_back({{"surface", use.surface}, {"receives", use.receives}, {"sends", use.sends}});
+  message.body = {{"tick", run.tick},       {"end", run.end},         {"window", run.window},
+                  {"gravity", run.gravity}, {"results", run.results}, {"uses", uses},
+                  {"pulse", pulse_endpoint}};
+  return message;
+}
+
+Welcome read_welcome(const Message& message) {
+  Welcome welcome;
+  const auto& body = message.body;
+  welcome.run.tick = value<double>(message, body, "tick");
+  if (!(welcome.run.tick > 0) || !std::isfinite(welcome.run.tick)) throw ProtocolError("\"tick\" of welcome is not positive");
+  welcome.run.end = value<std::int64_t>(message, body, "end");
+  welcome.run.window = value<std::int64_t>(message, body, "window");
+  const auto gravity = value<std::vector<double>>(message, body, "gravity");
+  if (gravity.size() != 3) throw ProtocolError("\"gravity\" of welcome must have three components");
+  std::copy(gravity.begin(), gravity.end(), welcome.run.gravity);
+  welcome.run.results = value<std::string>(message, body, "results");
+  for (const auto& use : value<Body>(message, body, "uses"))
+    welcome.run.uses.push_back({value<std::string>(message, use, "surface"),
+                                value<std::vector<std::string>>(message, use, "receives"),
+                                value<std::vector<std::string>>(message, use, "sends")});
+  welcome.pulse_endpoint = value<std::string>(message, body, "pulse");
+  return welcome;
+}
+
+Message interface_message(const std::vector<Surface>& surfaces) {
+  Message message;
+  message.kind = Kind::interface;
+  Body names = Body::array();
+  for (const auto& surface : surfaces) {
+    names.push_back(surface.name);
+    message.arrays.push_back(vectors("points", surface.name, surface.mesh.points));
+    const auto& nodes = surface.mesh.connectivity();
+    message.arrays.push_back(
+        Array::of("nodes", surface.name, {nodes.size()}, std::vector<std::int32_t>(nodes.begin(), nodes.end())));
+    std::vector<std::uint8_t> kinds;
+    for (const auto kind : surface.mesh.kinds()) kinds.push_back(static_cast<std::uint8_t>(kind));
+    const std::uint64_t faces = kinds.size();  // before the move: arguments have no order
+    message.arrays.push_back(Array::of("kinds", surface.name, {faces}, std::move(kinds)));
+  }
+  message.body = {{"surfaces", names}};
+  return message;
+}
+
+std::vector<Surface> read_interface(const Message& message) {
+  std::vector<Surface> surfaces;
+  for (const auto& name : value<std::vector<std::string>>(message, message.body, "surfaces")) {
+    Surface surface{name, {}};
+    surface.mesh.points = vectors(array(message, "points", name));
+    const auto nodes = array(message, "nodes", name).integers();
+    std::size_t first = 0;
+    for (const auto kind : array(message, "kinds", name).octets()) {
+      const auto count = geometry::nodes_of(static_cast<geometry::FaceKind>(kind));
+      if (count == 0) throw ProtocolError(fmt::format("surface {} has a face of unknown kind {}", name, kind));
+      if (first + count > nodes.size()) throw ProtocolError(fmt::format("surface {} names fewer nodes than its faces need", name));
+      std::vector<std::uint32_t> face(nodes.begin() + static_cast<std::ptrdiff_t>(first),
+                                      nodes.begin() + static_cast<std::ptrdiff_t>(first + count));
+      try {
+        surface.mesh.add_face(static_cast<geometry::FaceKind>(kind), face);
+      } catch (const std::invalid_argument& error) {
+        throw ProtocolError(fmt::format("surface {}: {}", name, error.what()));
+      }
+      first += count;
+    }
+    if (first != nodes.size()) throw ProtocolError(fmt::format("surface {} names more nodes than its faces need", name));
+    surfaces.push_back(std::move(surface));
+  }
+  return surfaces;
+}
+
+Message advance_message(const Window& window, const std::vector<Field>& fields) {
+  Message message;
+  message.kind = Kind::advance;
+  message.body = {{"start", window.start}, {"end", window.end}};
+  for (const auto& field : fields) message.arrays.push_back(vectors(field.name, field.surface, field.values));
+  return message;
+}
+
+AdvanceRequest read_advance(const Message& message) {
+  AdvanceRequest request{value<std::int64_t>(message, message.body, "start"),
+                         value<std::int64_t>(message, message.body, "end"), read_fields(message)};
+  if (request.start < 0 || request.end <= request.start) throw ProtocolError("advance over a window that has no length");
+  return request;
+}
+
+namespace {
+
+Body pairs(const std::vector<std::pair<std::string, double>>& values) {
+  Body list = Body::array();  // a list keeps the order in which the solver reports
+  for (const auto& [name, number] : values) list.push_back({name, number});
+  return list;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, double>> read_values(const Body& body) {
+  std::vector<std::pair<std::string, double>> values;
+  const auto found = body.find("values");
+  if (found == body.end()) return values;
+  if (!found->is_array()) throw ProtocolError("\"values\" is not a list of [name, number]");
+  for (const auto& pair : *found) {
+    if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_number())
+      throw ProtocolError("\"values\" is not a list of [name, number]");
+    values.emplace_back(pair[0].get<std::string>(), pair[1].get<double>());
+  }
+  return values;
+}
+
+Message advanced_message(const Advance& advance) {
+  Message message;
+  message.kind = Kind::advanced;
+  message.body = {{"values", pairs(advance.quantities)}, {"steps", advance.steps}};
+  for (const auto& field : advance.fields) message.arrays.push_back(vectors(field.name, field.surface, field.values));
+  return message;
+}
+
+Advance read_advanced(const Message& message) {
+  return {read_fields(message), read_values(message.body), value<std::uint64_t>(message, message.body, "steps")};
+}
+
+Message done_message(const std::vector<std::pair<std::string, double>>& values) {
+  Message message;
+  message.kind = Kind::done;
+  message.body = {{"values", pairs(values)}};
+  return message;
+}
+
+Message error_message(const std::string& text, const std::string& state, bool unsupported, bool mistake) {
+  Message message;
+  message.kind = Kind::error;
+  message.body = {{"text", text}, {"state", state}, {"unsupported", unsupported}, {"mistake", mistake}};
+  return message;
+}
+
+Error read_error(const Message& message) {
+  const auto text = [&](const char* key) {
+    const auto found = message.body.find(key);
+    return found != message.body.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  const auto flag = [&](const char* key) {
+    const auto found = message.body.find(key);
+    return found != message.body.end() && found->is_boolean() && found->get<bool>();
+  };
+  return {text("text"), text("state"), flag("unsupported"), flag("mistake")};
+}
+
+}  // namespace acopla::protocol

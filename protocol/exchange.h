@@ -1,0 +1,50 @@
+// Between the structures of C++ and the messages of the protocol: one place for each body's layout (docs/protocol.md, §4).
+#pragma once
+
+#include "protocol/participant.h"
+
+namespace acopla::protocol {
+
+Message hello_message(const std::string& participant, const Introduction& introduction);
+struct Hello {
+  std::string participant;
+  Introduction introduction;
+  std::uint64_t version_low = 0, version_high = 0;
+};
+Hello read_hello(const Message& message);
+
+Message welcome_message(const Run& run, const std::string& pulse_endpoint);
+struct Welcome {
+  Run run;
+  std::string pulse_endpoint;
+};
+Welcome read_welcome(const Message& message);
+
+Message interface_message(const std::vector<Surface>& surfaces);
+std::vector<Surface> read_interface(const Message& message);
+
+Message advance_message(const Window& window, const std::vector<Field>& fields);
+struct AdvanceRequest {
+  std::int64_t start = 0, end = 0;
+  std::vector<Field> fields;
+};
+AdvanceRequest read_advance(const Message& message);
+
+Message advanced_message(const Advance& advance);
+Advance read_advanced(const Message& message);
+
+/// An answer without fields: `done`, with scalar values.
+Message done_message(const std::vector<std::pair<std::string, double>>& values = {});
+std::vector<std::pair<std::string, double>> read_values(const Body& body);
+
+/// `unsupported` tells a kind that this participant cannot do from a failure; `mistake` a user's mistake, whose text is a
+/// located sentence, from both.
+Message error_message(const std::string& text, const std::string& state, bool unsupported = false, bool mistake = false);
+struct Error {
+  std::string text, state;
+  bool unsupported = false, mistake = false;
+};
+/// Never throws: what an error lacks stays empty.
+Error read_error(const Message& message);
+
+}  // namespace acopla::protocol

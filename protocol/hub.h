@@ -1,0 +1,40 @@
+// The coupler's end of all connections: a ROUTER that knows its peers by number and never trusts what they send.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <zmq.hpp>
+
+#include "protocol/message.h"
+
+namespace acopla::protocol {
+
+/// Something that arrived: a message, or the reason why it was none.
+struct Arrival {
+  std::string peer;                ///< address for send()
+  std::optional<Message> message;  ///< empty when what came was not a message
+  std::string fault;               ///< why not
+};
+
+class Hub {
+ public:
+  /// Binds. @throws io::UserError when the address is in use or not allowed
+  Hub(zmq::context_t& context, const std::string& endpoint);
+  const std::string& endpoint() const { return endpoint_; }  ///< with the port the system chose for tcp://…:0
+
+  std::optional<Arrival> receive(std::chrono::milliseconds wait);
+  /// @return false when the peer is gone
+  bool send(const std::string& peer, const Message& message);
+  /// For a poll together with other descriptors.
+  zmq::socket_t& socket() { return socket_; }
+
+ private:
+  zmq::socket_t socket_;
+  std::string endpoint_;
+};
+
+/// Binds a socket and says so in a sentence when it cannot.
+std::string bind_or_explain(zmq::socket_t& socket, const std::string& endpoint);
+
+}  // namespace acopla::protocol

@@ -1,0 +1,90 @@
+// What a solver implements to be coupled. It never learns who is on the other side.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "geometry/surface_mesh.h"
+#include "protocol/message.h"
+
+namespace acopla::protocol {
+
+/// What a solver says of itself before it has read anything large.
+struct Introduction {
+  std::string solver;                     ///< e.g. "dem"
+  int dimension = 3;                      ///< 2 or 3
+  std::vector<std::string> capabilities;  ///< of "save", "checkpoint"; what is not listed is answered by an error
+};
+
+/// What the coupler tells a solver about the run.
+struct Run {
+  double tick = 0;            ///< length of a tick [s]
+  std::int64_t end = 0;       ///< end of coupled time [ticks]
+  std::int64_t window = 0;    ///< nominal length of a window [ticks]
+  double gravity[3] = {0, 0, 0};  ///< [m/s²]
+  std::string results;        ///< folder for the solver's own results; empty: write none
+  /// Surfaces the coupling uses, with the fields it will send and expects back; surfaces not named here need not be
+  /// computed, stored or sent.
+  struct Use {
+    std::string surface;
+    std::vector<std::string> receives;  ///< fields the solver is given, e.g. "force"
+    std::vector<std::string> sends;     ///< fields the solver must give, e.g. "displacement"
+  };
+  std::vector<Use> uses;
+  double time(std::int64_t ticks) const { return static_cast<double>(ticks) * tick; }
+};
+
+struct Surface {
+  std::string name;
+  geometry::SurfaceMesh mesh;  ///< reference position
+};
+
+/// A span of coupled time, in ticks and seconds.
+struct Window {
+  std::int64_t start = 0, end = 0;  ///< [ticks]
+  double start_time = 0;            ///< [s]
+  double length = 0;                ///< [s]
+  double end_time() const { return start_time + length; }
+};
+
+/// A value per point of a surface. `force` is the mean over the window [N]; `displacement` [m] and `velocity` [m/s] are
+/// those at the window's end.
+struct Field {
+  std::string surface;
+  std::string name;
+  std::vector<Eigen::Vector3d> values;  ///< one per point of the surface, in its order
+};
+
+/// What a solver reports of a window: its fields and its scalar quantities, named as a user names them in [expect]
+/// ("reaction.z", "von_mises.max", "force.z"). Units are SI.
+struct Advance {
+  std::vector<Field> fields;
+  std::vector<std::pair<std::string, double>> quantities;
+  std::uint64_t steps = 0;  ///< the solver's own steps in this window
+};
+
+class Participant {
+ public:
+  virtual ~Participant() = default;
+
+  virtual Introduction introduce() const = 0;
+  /// Reads meshes, builds matrices, inserts particles. Called once. @return the surfaces named in `run.uses` (at least).
+  virtual std::vector<Surface> start(const Run& run) = 0;
+  /// Computes one window. Windows follow one another without gaps unless restore() was called or the coupling skips
+  /// windows that a static structure does not need.
+  virtual Advance advance(const Window& window, const std::vector<Field>& received) = 0;
+  /// The run ends well: write what is left to write. @return values for the summary ("seconds.solve", …)
+  virtual std::vector<std::pair<std::string, double>> finish() { return {}; }
+
+  /// Remember / return to the present state (implicit coupling). Default: not supported.
+  virtual void save();
+  virtual void restore();
+};
+
+/// A solver was asked for something it did not list among its capabilities.
+class Unsupported : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace acopla::protocol

@@ -1,0 +1,204 @@
+// The structure as a participant of a coupling.
+#include "fem/structure.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "gmsh_writer.h"
+#include "tractions.h"
+
+namespace acopla::fem::test {
+namespace {
+
+using protocol::Advance;
+using protocol::Window;
+
+constexpr double gravity = 9.81, density = 2000;
+
+class AStructure : public testing::Test {
+ protected:
+  Structure make(const std::string& more = "", const std::string& fix = "[structure.fix.z0]\n") {
+    const auto text = "dimension = 3\n[structure]\nsolver = \"fem\"\nmesh = \"" +
+                      write_block("block", {.size = {2, 1, 0.5}}) +
+                      "\"\n[structure.material]\nyoung = 1e9\npoisson = 0.2\n" + more + fix;
+    return Structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  }
+  static protocol::Run run(std::vector<std::string> sends = {"displacement", "velocity"}) {
+    protocol::Run result;
+    result.tick = 0.01;
+    result.end = 10;
+    result.window = 1;
+    result.gravity[2] = -gravity;
+    result.uses = {{"z1", {"force"}, std::move(sends)}};
+    return result;
+  }
+  static Window window(int index) { return {index, index + 1, 0.01 * index, 0.01}; }
+  static std::map<std::string, double> quantities(const Advance& advance) {
+    return {advance.quantities.begin(), advance.quantities.end()};
+  }
+};
+
+TEST_F(AStructure, CarriesItsWeightAndTheForcesItReceives) {
+  auto structure = make("density = 2000\n");
+  const auto surfaces = structure.start(run());
+  ASSERT_EQ(surfaces.size(), 1u);
+  EXPECT_EQ(surfaces[0].name, "z1");
+  const auto pressure = traction_loads(surfaces[0].mesh, [](const Vec3&, const Vec3& n) {
+    return Vec3(-1000 * n + Vec3(50, 0, 0));
+  });
+  const auto advance = structure.advance(window(0), {{"z1", "force", pressure}});
+  const auto found = quantities(advance);
+  const double weight = density * 1.0 * gravity, area = 2.0;
+  // Force balance to 1e-10, as TEST(Balance, …) has it.
+  EXPECT_NEAR(found.at("load.z"), -weight - 1000 * area, 1e-10 * weight);
+  EXPECT_NEAR(found.at("load.x"), 50 * area, 1e-10 * weight);
+  EXPECT_NEAR(found.at("reaction.z"), weight + 1000 * area, 1e-10 * weight);
+  EXPECT_NEAR(found.at("reaction.x"), -50 * area, 1e-10 * weight);
+  EXPECT_NEAR(found.at("reaction.y"), 0, 1e-10 * weight);
+  EXPECT_GT(found.at("von_mises.max"), 0);
+
+  ASSERT_EQ(advance.fields.size(), 2u);
+  double largest = 0;
+  for (const auto& u : advance.fields[0].values) {
+    EXPECT_LT(u[2], 0);
+    largest = std::max(largest, u.norm());
+  }
+  EXPECT_EQ(advance.fields[0].name, "displacement");
+  EXPECT_LE(largest, found.at("displacement.max"));
+  EXPECT_EQ(advance.fields[1].name, "velocity");
+  for (const auto& v : advance.fields[1].values) EXPECT_EQ(v.norm(), 0);
+}
+
+TEST_F(AStructure, HasNoWeightWithoutADensity) {
+  auto structure = make();
+  structure.start(run());
+  const auto found = quantities(structure.advance(window(0), {}));
+  EXPECT_EQ(found.at("reaction.z"), 0);
+  EXPECT_EQ(found.at("displacement.max"), 0);
+}
+
+TEST_F(AStructure, SendsOnlyTheFieldsThatWereAskedFor) {
+  auto structure = make();
+  structure.start(run({}));
+  EXPECT_TRUE(structure.advance(window(0), {}).fields.empty());
+}
+
+TEST_F(AStructure, LeftFreeToMoveIsRefusedWithTheMotionsNamed) {
+  auto structure = make("", "[structure.fix.z0]\ndirections = [\"z\"]\n");
+  try {
+    structure.start(run());
+    FAIL();
+  } catch (const io::UserError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("case.toml:"), std::string::npos) << text;
+    EXPECT_NE(text.find("structure.fix leaves the structure free to turn about the axis along z "
+                        "through (1, 0.5, 0), move along x, move along y."),
+              std::string::npos)
+        << text;
+  }
+}
+
+TEST_F(AStructure, RefusesSurfacesAndFieldsItDoesNotHave) {
+  auto missing = run();
+  missing.uses[0].surface = "inside";
+  EXPECT_THROW(make().start(missing), io::UserError);
+  EXPECT_THROW(make().start(run({"temperature"})), io::UserError);
+  auto structure = make();
+  structure.start(run());
+  EXPECT_THROW(structure.advance(window(0), {{"x1", "force", {}}}), std::runtime_error);
+  EXPECT_THROW(structure.advance(window(0), {{"z1", "force", {Vec3(1, 0, 0)}}}),
+               std::runtime_error);
+}
+
+TEST_F(AStructure, ReportsWhatItCost) {
+  auto structure = make();
+  structure.start(run());
+  structure.advance(window(0), {});
+  std::map<std::string, double> cost;
+  for (const auto& [name, value] : structure.finish()) cost[name] = value;
+  EXPECT_EQ(cost.at("dofs"), 3 * 5 * 5 * 5);
+  EXPECT_GT(cost.at("factor.bytes"), 0);
+  for (const auto* name : {"seconds.setup", "seconds.factor", "seconds.solve", "residual"})
+    EXPECT_GE(cost.at(name), 0) << name;
+}
+
+class Pictures : public AStructure {
+ protected:
+  Pictures() {
+    folder_ = std::filesystem::path(write_file("marker", "")).parent_path() / "results";
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  protocol::Run drawing() const {
+    auto result = run();
+    result.results = folder_.string();
+    return result;
+  }
+  int count() const {
+    int files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_))
+      files += entry.path().extension() == ".vtu";
+    return files;
+  }
+  std::filesystem::path folder_;
+};
+
+TEST_F(Pictures, AreOfTheLastWindowUnlessTheCaseSaysHowOften) {
+  auto structure = make();
+  structure.start(drawing());
+  for (int w = 0; w < 10; ++w) structure.advance(window(w), {});
+  EXPECT_EQ(count(), 0);
+  structure.finish();
+  EXPECT_EQ(count(), 1);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "structure_0001.vtu"));
+  std::ifstream series(folder_ / "structure.pvd");
+  const std::string text(std::istreambuf_iterator<char>(series), {});
+  EXPECT_NE(text.find("structure_0001.vtu"), std::string::npos) << text;
+}
+
+TEST_F(Pictures, ComeAsOftenAsTheCaseSays) {
+  auto structure = make("[structure.output]\nevery = 0.03\n");
+  structure.start(drawing());
+  for (int w = 0; w < 10; ++w) structure.advance(window(w), {});
+  structure.finish();
+  EXPECT_EQ(count(), 4);  // at 0.03, 0.06, 0.09 and the end
+}
+
+TEST_F(Pictures, OfRejectedIterationsAreNotKept) {
+  auto structure = make("[structure.output]\nevery = 0.01\n");
+  structure.start(drawing());
+  structure.save();
+  for (int iteration = 0; iteration < 3; ++iteration) {
+    structure.restore();
+    structure.advance(window(0), {});
+  }
+  structure.save();
+  EXPECT_EQ(count(), 1);
+  structure.finish();
+  EXPECT_EQ(count(), 1);
+}
+
+TEST_F(Pictures, CanBeTurnedOff) {
+  auto structure = make("[structure.output]\nvtu = false\n");
+  structure.start(drawing());
+  structure.advance(window(0), {});
+  structure.finish();
+  EXPECT_EQ(count(), 0);
+}
+
+TEST(Explanation, SaysWhatWillRun) {
+  const auto text = "dimension = 3\n[structure]\nmesh = \"" + write_block("block") +
+                    "\"\n[structure.material]\nyoung = 1e9\npoisson = 0.2\n[structure.fix.z0]\n";
+  const auto lines = explain(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  for (const auto* part : {"8 hexahedra of degree 2", "125 nodes, 375 unknowns (75 held)",
+                           "surfaces of the mesh: x0, x1", "no density, so no weight",
+                           "direct (Cholesky, factored once)", "a window"})
+    EXPECT_NE(lines.find(part), std::string::npos) << lines;
+}
+
+}  // namespace
+}  // namespace acopla::fem::test
