@@ -103,7 +103,7 @@ void read_interfaces(const io::Table& coupling, Case& read) {
   for (const auto& table : coupling.list("interface")) {
     InterfaceCase interface;
     interface.from = read_surface(table, "from", read);
-    interface.to = read_surface(table, "to", read);
+    if (table.has("to")) interface.to = read_surface(table, "to", read);
     interface.at = table.location();
     interface.from_at = table.location("from");
     interface.to_at = table.location("to");
@@ -129,6 +129,9 @@ void read_loads(const io::Table& coupling, Case& read) {
   const auto only_for = [&](const char* key, const char* which) {
     if (coupling.has(key)) coupling.fail(key, fmt::format("has a meaning with loads = {} only. Remove it.", which));
   };
+  if (std::all_of(read.interfaces.begin(), read.interfaces.end(), [](const auto& i) { return i.recorded_only(); }))
+    for (const char* key : {"at", "over", "loads_from"})
+      if (coupling.has(key)) coupling.fail(key, "has no effect: no interface has a receiver. Add `to` to one, or remove it.");
   if (read.loads == Loads::history) {
     only_for("at", "\"mean\" or \"snapshot\"");
     only_for("over", "\"mean\"");

@@ -18,11 +18,12 @@ struct SurfaceName {
   bool operator==(const SurfaceName&) const = default;
 };
 
-/// [[coupling.interface]]: forces go from one surface to another.
+/// [[coupling.interface]]: forces go from one surface to another, or, without `to`, into the record alone.
 struct InterfaceCase {
   SurfaceName from, to;
   io::Location at, from_at, to_at;
-  std::string text() const { return from.text() + " to " + to.text(); }
+  bool recorded_only() const { return to.participant.empty(); }
+  std::string text() const { return recorded_only() ? from.text() + " (recorded)" : from.text() + " to " + to.text(); }
 };
 
 /// A recorded participant plays instead of a live one.

@@ -37,7 +37,15 @@ OneWay::OneWay(const Case& read, Crew& crew, Record& record, Quantities& quantit
 }
 
 void OneWay::build(const InterfaceCase& interface) {
-  Interface link{&interface, &crew_.surface(interface.from, interface.from_at), &crew_.surface(interface.to, interface.to_at), nullptr};
+  Interface link{&interface, &crew_.surface(interface.from, interface.from_at), nullptr, nullptr};
+  if (interface.recorded_only()) {
+    record_.add_surface(interface.from.text(), *link.from);
+    record_.set_mapping(links_.size(), 0, 0);
+    interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
+    links_.push_back(std::move(link));
+    return;
+  }
+  link.to = &crew_.surface(interface.to, interface.to_at);
   if (link.to->face_count() == 0)
     throw io::UserError(interface.to_at, fmt::format("surface {} has no faces to receive forces.", interface.to.text()));
   link.mapping = std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance});
@@ -134,11 +142,15 @@ void OneWay::map_forces(const std::string& sender, std::int64_t window, const pr
     if (link.about->from.participant != sender) continue;
     const auto& sent = force_on(advance, link.about->from.surface);
     record.forces[link.about->from.text()] = sent;
-    std::vector<Vec3> received(link.to->points.size());
-    link.mapping->forces(sent, received);
     const Vec3 centre = link.from->centroid();
     auto& row = record.ledger[k];
     row.sent = resultant(link.from->points, sent, centre);
+    if (!link.mapping) {
+      row.received = row.sent;
+      continue;
+    }
+    std::vector<Vec3> received(link.to->points.size());
+    link.mapping->forces(sent, received);
     row.received = resultant(link.to->points, received, centre);
     row.loss = loss(row.sent, row.received);
     add_to_load(link, window, received);

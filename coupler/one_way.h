@@ -37,7 +37,7 @@ class OneWay {
  private:
   struct Interface {
     const InterfaceCase* about;
-    const geometry::SurfaceMesh *from, *to;
+    const geometry::SurfaceMesh *from, *to;  // to, mapping: null where the forces are recorded only
     std::unique_ptr<Mapping> mapping;
   };
   struct Receiver {

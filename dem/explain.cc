@@ -13,29 +13,35 @@
 namespace acopla::dem {
 namespace {
 
-// Seconds a particle-step of this scene's kernel, measured on a cubic lattice that touches its six neighbours: about
-// the number of contacts of a settled bed.
+// Seconds a particle-step of this scene's kernel, measured on what the settled scene will look like: a cubic lattice of
+// touching spheres that fills the first region from its lower corner against gravity, between the scene's own walls.
 double measure_particle_step(const Scene& scene, double step) {
   const auto& first = scene.insertions.front();
-  const auto side = static_cast<int>(std::ceil(std::cbrt(std::min<double>(8000, static_cast<double>(scene.particle_count())))));
-  Scene trial = scene;
-  trial.walls.clear();
-  trial.domain.reset();
-  trial.gravity.setZero();
+  const double spacing = 2 * first.radius * (1 - 1e-4);
+  Eigen::Index up = 2;
+  if (!scene.gravity.isZero(0)) scene.gravity.cwiseAbs().maxCoeff(&up);
+  const bool falls_up = scene.gravity[up] > 0;
+  const auto along = [&](Eigen::Index d) { return std::max(1, static_cast<int>((first.high[d] - first.low[d]) / spacing)); };
+  const Eigen::Index side = (up + 1) % 3, other = (up + 2) % 3;
   Particles particles;
   particles.rotates = rotates(scene.laws);
-  const double spacing = 2 * first.radius * (1 - 1e-4);
-  for (int z = 0; z < side; ++z)
-    for (int y = 0; y < side; ++y)
-      for (int x = 0; x < side; ++x)
-        particles.add(Vec3(x, y, z) * spacing, first.radius, scene.materials[first.material].density, first.material, Vec3::Zero());
-  const auto count = static_cast<double>(particles.size());
-  const auto engine = make_engine(trial, std::move(particles));
-  engine->advance(2, step * 1e-3);
+  const auto count = std::min<std::size_t>(20000, scene.particle_count());
+  for (int layer = 0; particles.size() < count; ++layer)
+    for (int j = 0; j < along(other) && particles.size() < count; ++j)
+      for (int i = 0; i < along(side) && particles.size() < count; ++i) {
+        Vec3 at;
+        at[side] = first.low[side] + (i + 0.5) * spacing;
+        at[other] = first.low[other] + (j + 0.5) * spacing;
+        at[up] = falls_up ? first.high[up] - (layer + 0.5) * spacing : first.low[up] + (layer + 0.5) * spacing;
+        particles.add(at, first.radius, scene.materials[first.material].density, first.material, Vec3::Zero());
+      }
+  const auto engine = make_engine(scene, std::move(particles));
+  engine->advance(2, step * 1e-3);  // so short that nothing moves
   const auto begin = std::chrono::steady_clock::now();
-  constexpr int steps = 40;
-  engine->advance(steps, step * 1e-3);
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / (steps * count);
+  const auto elapsed = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(); };
+  std::uint64_t steps = 0;
+  for (; elapsed() < 0.1; steps += 10) engine->advance(10, step * 1e-3);
+  return elapsed() / static_cast<double>(steps * count);
 }
 
 std::string left_out(const Scene& scene, std::size_t meshes, std::size_t planes) {
