@@ -27,6 +27,7 @@ class EngineOf final : public Engine {
       : gravity_(scene.gravity), materials_(scene.materials.size()), particles_(std::move(particles)), walls_(std::move(walls)) {
     for (const auto& pair : scene.pairs) parameters_.push_back(Model::from(pair));
     pair_properties_ = scene.pairs;
+    batches_.resize(scene.pairs.size());
     for (const auto& wall : walls_.walls()) wall_material_.push_back(wall.material);
     smallest_ = largest_ = particles_.size() ? particles_.position[0].w : 0;
     for (const auto& p : particles_.position) {
@@ -79,29 +80,22 @@ class EngineOf final : public Engine {
   }
 
   double step_ratio(double step) const override {
-    // Per particle the sums of stiffness and dashpot over its contacts. Against a neighbour of its own kind both move,
-    // hence the factor 2 of Gershgorin's bound; a wall does not move.
+    // Per particle the sums of stiffness and dashpot over its contacts, whatever their directions: the sum over all
+    // directions is about three times that along one, which covers that neighbours move against each other.
     std::vector<double> stiffness(particles_.size(), 0.0), dashpot(particles_.size(), 0.0);
-    const auto add = [&](std::uint32_t i, double factor, const Kinematics& k, const PairProperties& pair) {
+    const auto add = [&](std::uint32_t i, const Kinematics<double>& k, const PairProperties& pair) {
       const double k_n = Model::Normal::stiffness(k, Model::Normal::from(pair));
-      const double c_n = pair.hertz_damping > 0 ? pair.hertz_damping * std::sqrt(k_n * k.reduced_mass)
-                                                : 2 * pair.damping_ratio * std::sqrt(k_n * k.reduced_mass);
-      stiffness[i] += factor * k_n;
-      dashpot[i] += factor * c_n;
+      stiffness[i] += k_n;
+      dashpot[i] += (pair.hertz_damping > 0 ? pair.hertz_damping : 2 * pair.damping_ratio) * std::sqrt(k_n * k.reduced_mass);
     };
     for_each_contact([&](std::uint32_t i, std::uint32_t j, double overlap) {
-      Kinematics k{};
-      k.overlap = overlap;
-      reduce(i, j, k);
+      const auto k = still(i, j, overlap);
       const auto& pair = pair_properties_[particles_.material[i] * materials_ + particles_.material[j]];
-      add(i, 2, k, pair);
-      add(j, 2, k, pair);
+      add(i, k, pair);
+      add(j, k, pair);
     });
     for_each_wall_overlap([&](std::uint32_t i, std::uint32_t element, double overlap) {
-      Kinematics k{};
-      k.overlap = overlap;
-      reduce_to_wall(i, k);
-      add(i, 1, k, pair_properties_[particles_.material[i] * materials_ + wall_material_[walls_.wall_of(element)]]);
+      add(i, still(i, overlap), pair_properties_[particles_.material[i] * materials_ + wall_material_[walls_.wall_of(element)]]);
     });
     double worst = 0;
     for (std::size_t i = 0; i < particles_.size(); ++i) {
@@ -114,11 +108,10 @@ class EngineOf final : public Engine {
   }
 
  private:
-  using History = typename Model::History;
   using Parameters = typename Model::Parameters;
-  static constexpr std::size_t history_bytes = Model::has_history ? sizeof(History) : 0;
+  static constexpr std::size_t history_bytes = Model::has_history ? sizeof(Record) : 0;
   static constexpr bool rotating = Model::has_friction || Model::has_rolling;
-  static constexpr std::size_t batch = 256;
+  static constexpr std::size_t batch_size = 256;
 
   // Forces on the walls, summed over steps.
   struct Accumulator {
@@ -141,11 +134,17 @@ class EngineOf final : public Engine {
   struct Held {
     std::uint32_t element;
     Vec3 point, normal;
-    History history;
+    Record history;  // a SpringHistory
   };
 
   struct Candidate {
     std::uint32_t i, j, slot;
+  };
+
+  // Touching pairs of one pair of materials.
+  struct Batch {
+    std::array<Candidate, batch_size + 4> candidates;
+    std::size_t count = 0;
   };
 
   void set_domain(const Scene& scene) {
@@ -245,94 +244,121 @@ class EngineOf final : public Engine {
     wall_forces(step, loads);
   }
 
-  // Touching pairs are gathered without branches on the forces, then computed in batches: the layout that SIMD wants.
+  // Touching pairs are gathered without branches on the forces, sorted by their pair of materials, and computed four at a
+  // time: all lanes of a batch share their parameters.
   void pair_forces(double step) {
-    std::array<Candidate, batch> touching;
-    std::size_t count = 0;
     touching_ = 0;
     const auto n = static_cast<std::uint32_t>(particles_.size());
     for (std::uint32_t i = 0; i < n; ++i) {
       const Record a = particles_.position[i];
+      const auto row = particles_.material[i] * materials_;
       for (auto k = pairs_.start[i]; k < pairs_.start[i + 1]; ++k) {
         const auto j = pairs_.second[k];
         const Record& b = particles_.position[j];
         const double dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z, reach = a.w + b.w;
         const bool touches = dx * dx + dy * dy + dz * dz < reach * reach;
         if constexpr (Model::has_history) {
-          if (!touches && was_touching_[k]) history_[k] = History{};
+          if (!touches && was_touching_[k]) history_[k] = Record{};
           was_touching_[k] = touches;
         }
-        touching[count] = {i, j, k};
-        count += touches;
-        if (count == batch) {
-          pair_batch(touching.data(), count, step);
-          touching_ += std::exchange(count, 0);
-        }
+        auto& batch = batches_[materials_ == 1 ? 0 : row + particles_.material[j]];
+        batch.candidates[batch.count] = {i, j, k};
+        batch.count += touches;
+        if (batch.count == batch_size) run_batch(batch, step);
       }
     }
-    pair_batch(touching.data(), count, step);
-    touching_ += count;
+    for (auto& batch : batches_) run_batch(batch, step);
   }
 
-  void pair_batch(const Candidate* touching, std::size_t count, double step) {
-    [[maybe_unused]] History none;
-    for (std::size_t c = 0; c < count; ++c) {
-      const auto [i, j, slot] = touching[c];
-      const Record &a = particles_.position[i], &b = particles_.position[j];
-      Kinematics k;
-      const Vec3 line = a.vector() - b.vector();
-      const double distance = line.norm();
-      k.normal = line / distance;
-      k.overlap = a.w + b.w - distance;
-      k.step = step;
-      reduce(i, j, k);
-      const double arm_i = a.w - 0.5 * k.overlap, arm_j = b.w - 0.5 * k.overlap;  // both end at the contact point
-      const Vec3 relative = particles_.velocity[i].vector() - particles_.velocity[j].vector();
-      fill_motion(k, relative, arm_i, arm_j, i, &particles_.spin, j);
-      const auto& p = parameters_[particles_.material[i] * materials_ + particles_.material[j]];
-      typename Model::Response r;
-      if constexpr (Model::has_history) r = Model::respond(k, p, history_[slot]);
-      else r = Model::respond(k, p, none);
-      particles_.force[i].add(r.force);
-      particles_.force[j].add(-r.force);
-      if constexpr (rotating) {
-        const Vec3 turn = k.normal.cross(r.force);
-        particles_.torque[i].add(r.torque - arm_i * turn);
-        particles_.torque[j].add(-r.torque - arm_j * turn);
+  void run_batch(Batch& batch, double step) {
+    touching_ += batch.count;
+    const auto& parameters = parameters_[static_cast<std::size_t>(&batch - batches_.data())];
+    std::size_t c = 0;
+    for (; c + 4 <= batch.count; c += 4) respond_to_four(&batch.candidates[c], 4, parameters, step);
+    if (c < batch.count) {  // the last few: spare lanes repeat the first of them and are thrown away
+      for (std::size_t spare = batch.count; spare < c + 4; ++spare) batch.candidates[spare] = batch.candidates[c];
+      respond_to_four(&batch.candidates[c], batch.count - c, parameters, step);
+    }
+    batch.count = 0;
+  }
+
+  static Record4 gather(const std::vector<Record>& records, const Candidate* four, std::uint32_t Candidate::*which) {
+    return transposed(as_vector(records[four[0].*which]), as_vector(records[four[1].*which]), as_vector(records[four[2].*which]),
+                      as_vector(records[four[3].*which]));
+  }
+  static void scatter(std::vector<Record>& records, const Candidate* four, std::size_t lanes, std::uint32_t Candidate::*which,
+                      const Vector3<Double4>& values) {
+    const auto rows = transposed(values.x.v, values.y.v, values.z.v, Double4(0.0).v);
+    const Double4* row[] = {&rows.x, &rows.y, &rows.z, &rows.w};
+    for (std::size_t lane = 0; lane < lanes; ++lane) as_vector(records[four[lane].*which]) += row[lane]->v;
+  }
+
+  void respond_to_four(const Candidate* four, std::size_t lanes, const Parameters& parameters, double step) {
+    const auto a = gather(particles_.position, four, &Candidate::i), b = gather(particles_.position, four, &Candidate::j);
+    const auto v = gather(particles_.velocity, four, &Candidate::i), u = gather(particles_.velocity, four, &Candidate::j);
+    Kinematics<Double4> k;
+    const Vector3<Double4> line(a.x - b.x, a.y - b.y, a.z - b.z);
+    const Double4 distance = sqrt(dot(line, line));
+    k.normal = (Double4(1) / distance) * line;
+    k.overlap = a.w + b.w - distance;
+    k.step = step;
+    k.reduced_radius = a.w * b.w / (a.w + b.w);
+    k.reduced_mass = v.w * u.w / (v.w + u.w);
+    const Vector3<Double4> relative(v.x - u.x, v.y - u.y, v.z - u.z);
+    const Double4 along = dot(relative, k.normal);
+    k.closing_speed = -along;
+    const Double4 arm_i = a.w - 0.5 * k.overlap, arm_j = b.w - 0.5 * k.overlap;  // both end at the contact point
+    if constexpr (rotating) {
+      const auto w = gather(particles_.spin, four, &Candidate::i), q = gather(particles_.spin, four, &Candidate::j);
+      const Vector3<Double4> spin_i(w.x, w.y, w.z), spin_j(q.x, q.y, q.z);
+      // v + ω × (−arm n) on i, v + ω × (arm n) on j
+      k.slip = relative - along * k.normal - cross(arm_i * spin_i + arm_j * spin_j, k.normal);
+      k.mean_spin = 0.5 * (spin_i + spin_j);
+      k.relative_spin = spin_i - spin_j;
+      if constexpr (Model::has_rolling) k.reduced_inertia = w.w * q.w / (w.w + q.w);
+    }
+    SpringHistory<Double4> history;
+    if constexpr (Model::has_history) {
+      const auto h = gather(history_, four, &Candidate::slot);
+      history = {{h.x, h.y, h.z}, h.w};
+    }
+    const auto r = Model::respond(k, parameters, history);
+    if constexpr (Model::has_history) {
+      const auto rows = transposed(history.force.x.v, history.force.y.v, history.force.z.v, history.stiffness.v);
+      const Double4* row[] = {&rows.x, &rows.y, &rows.z, &rows.w};
+      for (std::size_t lane = 0; lane < lanes; ++lane) as_vector(history_[four[lane].slot]) = row[lane]->v;
+    }
+    scatter(particles_.force, four, lanes, &Candidate::i, r.force);
+    scatter(particles_.force, four, lanes, &Candidate::j, -r.force);
+    if constexpr (rotating) {
+      const Vector3<Double4> turn = cross(k.normal, r.force);
+      Vector3<Double4> on_i = -(arm_i * turn), on_j = -(arm_j * turn);
+      if constexpr (Model::has_rolling) {
+        on_i = on_i + r.torque;
+        on_j = on_j - r.torque;
       }
+      scatter(particles_.torque, four, lanes, &Candidate::i, on_i);
+      scatter(particles_.torque, four, lanes, &Candidate::j, on_j);
     }
   }
 
-  void reduce(std::uint32_t i, std::uint32_t j, Kinematics& k) const {
-    const double r_i = particles_.position[i].w, r_j = particles_.position[j].w;
-    const double m_i = particles_.velocity[i].w, m_j = particles_.velocity[j].w;
-    k.reduced_radius = r_i * r_j / (r_i + r_j);
-    k.reduced_mass = m_i * m_j / (m_i + m_j);
-    if constexpr (Model::has_rolling) {
-      const double inertia_i = particles_.spin[i].w, inertia_j = particles_.spin[j].w;
-      k.reduced_inertia = inertia_i * inertia_j / (inertia_i + inertia_j);
-    }
-  }
-
-  void reduce_to_wall(std::uint32_t i, Kinematics& k) const {
+  Kinematics<double> still(std::uint32_t i, double overlap) const {  // of i against a wall at rest, without motion
+    Kinematics<double> k{};
+    k.overlap = overlap;
     k.reduced_radius = particles_.position[i].w;
     k.reduced_mass = particles_.velocity[i].w;
     if constexpr (Model::has_rolling) k.reduced_inertia = particles_.spin[i].w;
+    return k;
   }
 
-  // Motion at the contact point. `spins` null: the other body does not turn (a wall at rest).
-  void fill_motion(Kinematics& k, const Vec3& relative, double arm_i, double arm_j, std::uint32_t i,
-                   const std::vector<Record>* spins, std::uint32_t j) const {
-    const double along = relative.dot(k.normal);
-    k.closing_speed = -along;
-    if constexpr (rotating) {
-      const Vec3 spin_i = particles_.spin[i].vector();
-      const Vec3 spin_j = spins ? (*spins)[j].vector() : Vec3(Vec3::Zero());
-      // v + ω × (−arm n) on i, v + ω × (arm n) on j
-      k.slip = relative - along * k.normal - (arm_i * spin_i + arm_j * spin_j).cross(k.normal);
-      k.mean_spin = 0.5 * (spin_i + spin_j);
-      k.relative_spin = spin_i - spin_j;
-    }
+  Kinematics<double> still(std::uint32_t i, std::uint32_t j, double overlap) const {
+    Kinematics<double> k{};
+    const double r_i = particles_.position[i].w, r_j = particles_.position[j].w;
+    const double m_i = particles_.velocity[i].w, m_j = particles_.velocity[j].w;
+    k.overlap = overlap;
+    k.reduced_radius = r_i * r_j / (r_i + r_j);
+    k.reduced_mass = m_i * m_j / (m_i + m_j);
+    return k;
   }
 
   void wall_forces(double step, Accumulator& loads) {
@@ -367,32 +393,51 @@ class EngineOf final : public Engine {
     for (std::size_t c = 0; c < found_.size(); ++c) {
       const auto& contact = found_[c];
       if (!(contact.distance > 0.05 * radius)) stop_at_wall(i, contact);
-      Kinematics k;
-      k.normal = contact.normal;
-      k.overlap = radius - contact.distance;
-      k.step = step;
-      reduce_to_wall(i, k);
-      fill_motion(k, particles_.velocity[i].vector(), contact.distance, 0, i, nullptr, 0);
+      const auto k = at_wall(i, contact, radius, step);
       const auto wall = walls_.wall_of(contact.element);
       const auto& p = parameters_[particles_.material[i] * materials_ + wall_material_[wall]];
-      typename Model::Response r;
-      if constexpr (Model::has_history) r = Model::respond(k, p, held_next_[first_held + c].history);
-      else {
-        History none;
-        r = Model::respond(k, p, none);
-      }
-      const Vec3 force = weights_[c] * r.force;
+      SpringHistory<double> history{};
+      if constexpr (Model::has_history) history = spring(held_next_[first_held + c].history);
+      const auto r = Model::respond(k, p, history);
+      if constexpr (Model::has_history) held_next_[first_held + c].history = stored(history);
+      const Vec3 force = weights_[c] * r.force.vector();
       particles_.force[i].add(force);
-      if constexpr (rotating) particles_.torque[i].add(weights_[c] * r.torque - contact.distance * k.normal.cross(force));
+      if constexpr (rotating) {
+        Vec3 torque = -contact.distance * contact.normal.cross(force);
+        if constexpr (Model::has_rolling) torque += weights_[c] * r.torque.vector();
+        particles_.torque[i].add(torque);
+      }
       // The force acts at the nearest point, which lies on the element: the barycentric weights carry force and moment.
       loads.wall_force[wall] -= force;
       if (walls_.is_triangle(contact.element)) {
         const auto& corners = walls_.triangle(contact.element);
         for (std::size_t n = 0; n < 3; ++n) loads.vertex_force[corners[n]] -= contact.weights[n] * force;
-        if constexpr (Model::has_rolling) loads.couple[contact.element] -= weights_[c] * r.torque;
+        if constexpr (Model::has_rolling) loads.couple[contact.element] -= weights_[c] * r.torque.vector();
       }
     }
     wall_contacts_ += found_.size();
+  }
+
+  // The contact point moves with the particle; the wall is at rest.
+  Kinematics<double> at_wall(std::uint32_t i, const NearestPoint& contact, double radius, double step) const {
+    auto k = still(i, radius - contact.distance);
+    k.step = step;
+    k.normal = Vector3<double>(contact.normal);
+    const Vector3<double> velocity(particles_.velocity[i].vector());
+    const double along = dot(velocity, k.normal);
+    k.closing_speed = -along;
+    if constexpr (rotating) {
+      const Vector3<double> spin(particles_.spin[i].vector());
+      k.slip = velocity - along * k.normal - cross(contact.distance * spin, k.normal);
+      k.mean_spin = 0.5 * spin;
+      k.relative_spin = spin;
+    }
+    return k;
+  }
+
+  static SpringHistory<double> spring(const Record& record) { return {{record.x, record.y, record.z}, record.w}; }
+  static Record stored(const SpringHistory<double>& history) {
+    return {history.force.x, history.force.y, history.force.z, history.stiffness};
   }
 
   // Gives every contact of particle w its history: its own element's, else that of a contact of the same wall that the
@@ -424,7 +469,7 @@ class EngineOf final : public Engine {
     }
     for (std::size_t c = 0; c < found_.size(); ++c)
       held_next_.push_back({found_[c].element, found_[c].point, found_[c].normal,
-                            origin_[c] == none ? History{} : held_[origin_[c]].history});
+                            origin_[c] == none ? Record{} : held_[origin_[c]].history});
     for (std::size_t c = 0; c < found_.size(); ++c) {
       if (origin_[c] != none) continue;
       for (std::size_t other = 0; other < found_.size(); ++other) {
@@ -432,7 +477,8 @@ class EngineOf final : public Engine {
         const double share = crease_share(radius, found_[c], found_[other]);
         if (share > 0) {
           held_next_[own + c].history = held_next_[own + other].history;
-          held_next_[own + c].history.force *= share;
+          auto& history = held_next_[own + c].history;
+          history.set(share * history.vector());
           break;
         }
       }
@@ -462,7 +508,7 @@ class EngineOf final : public Engine {
     }
     cells_.find_pairs(particles_.position, skin_, pairs_);
     if constexpr (Model::has_history) {
-      history_.assign(pairs_.size(), History{});
+      history_.assign(pairs_.size(), Record{});
       was_touching_.assign(pairs_.size(), 0);
     }
     find_walls();
@@ -488,7 +534,7 @@ class EngineOf final : public Engine {
 
   struct SavedPair {
     std::uint32_t i, j;
-    History history;
+    Record history;  // a SpringHistory
   };
 
   void collect_histories() {
@@ -506,7 +552,7 @@ class EngineOf final : public Engine {
 
   void restore_histories() {
     if constexpr (Model::has_history) {
-      const auto restore = [&](std::uint32_t i, std::uint32_t j, const History& history) {
+      const auto restore = [&](std::uint32_t i, std::uint32_t j, const Record& history) {
         for (auto k = pairs_.start[i]; k < pairs_.start[i + 1]; ++k)
           if (pairs_.second[k] == j) {
             history_[k] = history;
@@ -517,7 +563,7 @@ class EngineOf final : public Engine {
       };
       for (auto& saved : saved_pairs_) {
         if (restore(saved.i, saved.j, saved.history)) continue;
-        saved.history.flip();  // the pair stands the other way round now
+        saved.history.set(-saved.history.vector());  // the pair stands the other way round now
         restore(saved.j, saved.i, saved.history);
       }
       std::stable_sort(saved_walls_.begin(), saved_walls_.end(),
@@ -616,6 +662,7 @@ class EngineOf final : public Engine {
   Vec3 gravity_;
   std::size_t materials_;
   std::vector<Parameters> parameters_;
+  std::vector<Batch> batches_;  // one a pair of materials, like parameters_
   std::vector<PairProperties> pair_properties_;
   std::vector<std::uint8_t> wall_material_;
   Particles particles_;
@@ -626,7 +673,7 @@ class EngineOf final : public Engine {
 
   CellGrid cells_;
   PairList pairs_;
-  std::vector<History> history_;            // beside pairs_.second; empty without history
+  std::vector<Record> history_;             // SpringHistory beside pairs_.second; empty without history
   std::vector<std::uint8_t> was_touching_;  // likewise
   std::vector<Record> reference_;           // positions at the last rebuild
   std::uint64_t rebuilds_ = 0, steps_since_rebuild_ = 0;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dem/contact/kinematics.h"
+#include "dem/contact/vector3.h"
 
 namespace acopla::dem {
 

@@ -38,9 +38,11 @@ std::vector<protocol::Surface> Solver::start(const protocol::Run& run) {
   check_uses(run);
   scene_.gravity = Vec3(run.gravity[0], run.gravity[1], run.gravity[2]);
   WallSet walls(scene_.walls);
-  for (const auto& wall : scene_.walls)
+  for (const auto& wall : scene_.walls) {
+    triangles_dropped_ += wall.mesh.dropped;
     if (wall.mesh.dropped)
       fmt::print(stderr, "wall {}: {} degenerate triangles were left out\n", wall.name, wall.mesh.dropped);
+  }
   auto particles = insert_particles(scene_, walls, rotates(scene_.laws));
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses)
@@ -132,7 +134,8 @@ std::vector<std::pair<std::string, double>> Solver::finish() {
           {"particle_steps_per_second", seconds_ > 0 ? work / seconds_ : 0},
           {"particle_steps_per_second.last", last_rate_},  // of the last window: a settled bed
           {"list_rebuilds", static_cast<double>(engine_->rebuilds())},
-          {"couples_lost", static_cast<double>(couples_lost_)}};
+          {"couples_lost", static_cast<double>(couples_lost_)},
+          {"triangles_dropped", static_cast<double>(triangles_dropped_)}};
 }
 
 }  // namespace acopla::dem

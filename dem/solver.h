@@ -38,7 +38,7 @@ class Solver final : public protocol::Participant {
   std::unique_ptr<io::PvdSeries> pictures_;
   double next_picture_ = 0;
   std::uint64_t steps_ = 0;
-  std::size_t couples_lost_ = 0;
+  std::size_t couples_lost_ = 0, triangles_dropped_ = 0;
   double seconds_ = 0;
   double last_step_ = 0, last_rate_ = 0;
 };

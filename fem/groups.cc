@@ -22,8 +22,8 @@ void check_format(const std::string& path, const std::string& line) {
   double version = 0;
   int binary = 1;
   std::istringstream(line) >> version >> binary;
-  const bool known = (version >= 2 && version < 3) || (version >= 4 && version < 5);
-  if (!known) fail(path, "is not a gmsh mesh of version 2 or 4. Save it with -format msh4.");
+  const bool known = (version >= 2 && version < 3) || version == 4.1;
+  if (!known) fail(path, "is not a gmsh mesh of version 2 or 4.1. Save it with -format msh41.");
   if (binary != 0) fail(path, "is a binary gmsh mesh. Save it as ASCII (Mesh.Binary = 0).");
 }
 

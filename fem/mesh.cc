@@ -3,11 +3,10 @@
 #include <deal.II/base/exceptions.h>
 #include <deal.II/dofs/dof_tools.h>
 #include <deal.II/fe/mapping_fe.h>
-#include <deal.II/grid/grid_in.h>
+#include <deal.II/grid/grid_tools.h>
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <fstream>
 #include <sstream>
 
 #include "fem/dealii_error.h"
@@ -26,38 +25,44 @@ using geometry::FaceKind;
   throw io::UserError(path + ": " + sentence);
 }
 
-void read(const std::string& path, Tria& triangulation) {
-  std::ifstream file(path);
-  dealii::GridIn<3> grid(triangulation);
-  try {
-    grid.read_msh(file);
-  } catch (const std::exception& error) {
-    fail(path,
-         "cannot be used as a mesh: " + first_line(error) +
-             " Needed are hexahedra or tetrahedra of first order (Mesh.ElementOrder = 1) in a "
-             "Physical Volume, and Physical Surfaces on their boundary.");
+/// Hands cells to deal.II, which counts the corners of a hexahedron lexicographically.
+void build(const std::string& path, const GmshMesh& mesh, Tria& triangulation) {
+  static constexpr std::size_t order[] = {0, 1, 3, 2, 4, 5, 7, 6};
+  std::vector<dealii::Point<3>> points;
+  for (const auto& p : mesh.points) points.emplace_back(p[0], p[1], p[2]);
+  std::vector<dealii::CellData<3>> cells;
+  for (const auto& corners : mesh.cells) {
+    dealii::CellData<3> cell(mesh.simplex ? 4 : 8);
+    for (std::size_t i = 0; i < cell.vertices.size(); ++i)
+      cell.vertices[i] = corners[mesh.simplex ? i : order[i]];
+    cells.push_back(std::move(cell));
   }
-  if (triangulation.n_active_cells() == 0)
-    fail(path, "has no cells. Put the solid in a Physical Volume: gmsh saves named parts only.");
+  try {
+    if (!mesh.simplex) dealii::GridTools::consistently_order_cells(cells);
+    triangulation.create_triangulation(points, cells, {});
+  } catch (const std::exception& error) {
+    fail(path, "cannot be used as a mesh: " + first_line(error));
+  }
 }
 
-bool is_simplex(const std::string& path, const Tria& triangulation) {
-  const auto& shapes = triangulation.get_reference_cells();
-  if (shapes.size() == 1 && shapes[0] == dealii::ReferenceCells::Hexahedron) return false;
-  if (shapes.size() == 1 && shapes[0] == dealii::ReferenceCells::Tetrahedron) return true;
-  fail(path, "mixes shapes of cells. Use hexahedra alone or tetrahedra alone.");
-}
-
-std::unique_ptr<Discretisation> discretise(const std::string& path, int degree) {
+std::unique_ptr<Discretisation> discretise(const std::string& path, const GmshMesh& mesh,
+                                           int degree) {
   dealii::deal_II_exceptions::disable_abort_on_exception();  // debug builds: throw, as release does
   auto result = std::make_unique<Discretisation>();
-  read(path, result->triangulation);
-  const bool simplex = is_simplex(path, result->triangulation);
-  result->element = make_element(simplex, degree);
-  result->mapping = std::make_unique<dealii::MappingFE<3>>(*make_element(simplex, 1));
+  build(path, mesh, result->triangulation);
+  result->element = make_element(mesh.simplex, degree);
+  result->mapping = std::make_unique<dealii::MappingFE<3>>(*make_element(mesh.simplex, 1));
   result->nodes.reinit(result->triangulation);
   result->nodes.distribute_dofs(*result->element);
   return result;
+}
+
+FaceKey key_of(const Face& face) {
+  FaceKey key;
+  key.fill(no_corner);
+  for (unsigned v = 0; v < face->n_vertices(); ++v) key[v] = face->vertex_index(v);
+  std::sort(key.begin(), key.end());
+  return key;
 }
 
 /// Node in the middle of the edge between two vertices.
@@ -105,10 +110,13 @@ BoundaryFace make_face(const Cell& cell, const Face& face, int degree) {
 
 }  // namespace
 
-Mesh::Mesh(const std::string& path, int degree)
+Mesh::Mesh(const std::string& path, int degree) : Mesh(path, read_gmsh(path), degree) {}
+
+Mesh::Mesh(const std::string& path, GmshMesh mesh, int degree)
     : groups_(read_physical_groups(path)),
-      discretisation_(discretise(path, degree)),
-      element_(discretisation_->triangulation.all_reference_cells_are_simplex(), degree) {
+      surfaces_(std::move(mesh.surfaces)),
+      discretisation_(discretise(path, mesh, degree)),
+      element_(mesh.simplex, degree) {
   number_nodes();
   measure(path);
 }
@@ -157,17 +165,20 @@ Eigen::Matrix3Xd Mesh::positions(std::size_t index) const {
 }
 
 std::vector<BoundaryFace> Mesh::boundary(const std::string& name) const {
-  const auto& group = find_surface(groups_, name);
-  const auto id = static_cast<dealii::types::boundary_id>(group.id);
+  const auto found = surfaces_.find(find_surface(groups_, name).id);
+  if (found == surfaces_.end()) throw std::invalid_argument("has no faces in the mesh.");
+  const auto& keys = found->second;
   std::vector<BoundaryFace> faces;
   for (const auto& cell : discretisation_->nodes.active_cell_iterators())
     for (const unsigned f : cell->face_indices())
-      if (cell->face(f)->at_boundary() && cell->face(f)->boundary_id() == id)
+      if (cell->face(f)->at_boundary() &&
+          std::binary_search(keys.begin(), keys.end(), key_of(cell->face(f))))
         faces.push_back(make_face(cell, cell->face(f), element_.degree));
-  if (faces.empty())
+  if (faces.size() < keys.size())
     throw std::invalid_argument(
-        "has no face on the boundary of the solid. A face counts in one physical group only, and "
-        "groups inside the solid cannot be used.");
+        "has " + std::to_string(keys.size() - faces.size()) + " of its " +
+        std::to_string(keys.size()) +
+        " faces inside the solid or apart from it. Only faces on the boundary can be used.");
   return faces;
 }
 

@@ -4,12 +4,14 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "fem/element.h"
+#include "fem/gmsh.h"
 #include "geometry/surface_mesh.h"
 
 namespace acopla::fem {
@@ -43,7 +45,7 @@ struct BoundaryFace {
 
 class Mesh {
  public:
-  /// Reads gmsh 2 or 4 ASCII: hexahedra or tetrahedra of first order.
+  /// Reads gmsh 2 or 4.1 ASCII: hexahedra or tetrahedra of first order.
   /// @param degree  of the displacements, 1 or 2
   /// @throws io::UserError located at the file when it cannot be read, has no cells, mixes shapes,
   /// or has inverted cells
@@ -72,16 +74,18 @@ class Mesh {
 
   const std::vector<PhysicalGroup>& groups() const { return groups_; }
   /// Faces of the boundary that belong to a surface group, in the order of the cells.
-  /// @throws std::invalid_argument as find_surface, or when the group has no face on the boundary
+  /// @throws std::invalid_argument as find_surface, or when it has faces off the boundary
   std::vector<BoundaryFace> boundary(const std::string& group) const;
 
   const Discretisation& discretisation() const { return *discretisation_; }
 
  private:
+  Mesh(const std::string& path, GmshMesh mesh, int degree);
   void number_nodes();
   void measure(const std::string& path);
 
   std::vector<PhysicalGroup> groups_;
+  std::map<int, std::vector<FaceKey>> surfaces_;  // by the group's number
   std::unique_ptr<Discretisation> discretisation_;
   Element element_;
   std::vector<Vec3> points_;

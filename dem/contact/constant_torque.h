@@ -1,10 +1,6 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
 #include "dem/contact/kinematics.h"
-#include "dem/contact/pair_properties.h"
 
 namespace acopla::dem {
 
@@ -12,12 +8,10 @@ namespace acopla::dem {
 /// equal and opposite on the two bodies).
 struct ConstantTorque {
   static constexpr const char* name = "constant_torque";
-  static constexpr const char* doc = "torque of constant size against the relative spin";
   struct Parameters {
     double friction;  ///< μ_r
   };
   static Parameters from(const PairProperties& pair) { return {pair.rolling_friction}; }
-  using History = None;
 
   /// The torque is capped so that it cannot reverse the relative spin within a step. A sphere may touch twelve others,
   /// each capped alone; explicit damping of neighbours that spin against each other is stable while the sum over contacts
@@ -25,20 +19,21 @@ struct ConstantTorque {
   static constexpr double share = 0.125;
 
   /// @return torque on i [N m]; −torque acts on j
-  static Vec3 torque(const Kinematics& k, double normal_force, const Parameters& p) {
-    const double spin = k.relative_spin.norm();
-    if (!(spin > 0)) return Vec3::Zero();
-    const double most = share * spin * k.reduced_inertia / k.step;
-    return k.relative_spin * (-std::min(p.friction * normal_force * k.reduced_radius, most) / spin);
+  template <class Real>
+  static Vector3<Real> torque(const Kinematics<Real>& k, const Real& normal_force, const Parameters& p) {
+    using std::min, std::sqrt;
+    const Real spin = sqrt(dot(k.relative_spin, k.relative_spin));
+    // As a factor of the relative spin: what the law asks over |ω|, or the cap, whichever is less.
+    const Real cap = (share / k.step) * k.reduced_inertia;
+    const Real asked = select(spin > Real(0), p.friction * normal_force * k.reduced_radius / spin, Real(0));
+    return -min(asked, cap) * k.relative_spin;
   }
 };
 
 struct FreeRolling {
   static constexpr const char* name = "none";
-  static constexpr const char* doc = "no rolling resistance";
   struct Parameters {};
   static Parameters from(const PairProperties&) { return {}; }
-  using History = None;
 };
 
 }  // namespace acopla::dem

@@ -1,29 +1,27 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
 #include "dem/contact/kinematics.h"
-#include "dem/contact/pair_properties.h"
 
 namespace acopla::dem {
 
 /// Linear spring–dashpot normal contact without tension (Cundall & Strack 1979; Nasato 2011, eq. 11–13).
 struct Linear {
   static constexpr const char* name = "linear";
-  static constexpr const char* doc = "linear spring and dashpot set by the restitution; never pulls";
   struct Parameters {
     double stiffness;      ///< k [N/m]
     double damping_ratio;  ///< c / (2 sqrt(k m*)); from the restitution (dem/contact/restitution.h)
   };
   static Parameters from(const PairProperties& pair) { return {pair.stiffness, pair.damping_ratio}; }
-  using History = None;
 
-  static double stiffness(const Kinematics&, const Parameters& p) { return p.stiffness; }
+  template <class Real>
+  static Real stiffness(const Kinematics<Real>&, const Parameters& p) {
+    return p.stiffness;
+  }
   /// @return normal force [N], ≥ 0
-  static double force(const Kinematics& k, const Parameters& p) {
-    return std::max(0.0, p.stiffness * k.overlap +
-                             2 * p.damping_ratio * std::sqrt(p.stiffness * k.reduced_mass) * k.closing_speed);
+  template <class Real>
+  static Real force(const Kinematics<Real>& k, const Parameters& p) {
+    using std::max, std::sqrt;
+    return max(Real(0), p.stiffness * k.overlap + 2 * p.damping_ratio * sqrt(p.stiffness * k.reduced_mass) * k.closing_speed);
   }
 };
 

@@ -5,7 +5,6 @@
 
 #include "dem/contact/constant_torque.h"
 #include "dem/contact/hertz.h"
-#include "dem/contact/kinematics.h"
 #include "dem/contact/linear.h"
 #include "dem/contact/linear_slider.h"
 #include "dem/contact/mindlin.h"
@@ -19,9 +18,8 @@ struct ContactModel {
   using Rolling = RollingLaw;
   static constexpr bool has_friction = !std::is_same_v<Tangential, Frictionless>;
   static constexpr bool has_rolling = !std::is_same_v<Rolling, FreeRolling>;
-  /// What a contact carries from step to step. An empty one is neither stored nor sent.
-  using History = typename Tangential::History;
-  static constexpr bool has_history = !std::is_same_v<History, None>;
+  /// Whether a contact carries a SpringHistory from step to step. Where not, none is stored.
+  static constexpr bool has_history = Tangential::has_history;
 
   struct Parameters {
     typename Normal::Parameters normal;
@@ -32,19 +30,21 @@ struct ContactModel {
     return {Normal::from(pair), Tangential::from(pair), Rolling::from(pair)};
   }
 
+  template <class Real>
   struct Response {
-    Vec3 force = Vec3::Zero();   ///< on i [N]
-    Vec3 torque = Vec3::Zero();  ///< rolling torque on i, equal and opposite on j [N m]
-    double normal_force = 0;     ///< [N]
+    Vector3<Real> force;   ///< on i [N]
+    Vector3<Real> torque;  ///< rolling torque on i, equal and opposite on j [N m]; set where the model rolls
   };
 
-  static Response respond(const Kinematics& k, const Parameters& p, History& history) {
-    Response response;
-    response.normal_force = Normal::force(k, p.normal);
-    response.force = response.normal_force * k.normal;
+  /// The same function for one contact with anything, and for four contacts of particles at a time.
+  template <class Real>
+  static Response<Real> respond(const Kinematics<Real>& k, const Parameters& p, SpringHistory<Real>& history) {
+    Response<Real> response;
+    const Real normal_force = Normal::force(k, p.normal);
+    response.force = normal_force * k.normal;
     if constexpr (has_friction)
-      response.force += Tangential::template force<Normal>(k, response.normal_force, p.tangential, p.normal, history);
-    if constexpr (has_rolling) response.torque = Rolling::torque(k, response.normal_force, p.rolling);
+      response.force = response.force + Tangential::template force<Normal>(k, normal_force, p.tangential, p.normal, history);
+    if constexpr (has_rolling) response.torque = Rolling::torque(k, normal_force, p.rolling);
     return response;
   }
 };

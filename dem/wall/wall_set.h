@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dem/contact/kinematics.h"
+#include "dem/contact/vector3.h"
 #include "dem/particles.h"
 #include "geometry/bucket_grid.h"
 #include "io/stl.h"

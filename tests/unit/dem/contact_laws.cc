@@ -7,16 +7,16 @@
 namespace acopla::dem {
 namespace {
 
-Kinematics contact(double overlap, const Vec3& slip = Vec3::Zero(), double step = 1e-5) {
-  Kinematics k{};
+using Vector = Vector3<double>;
+
+Kinematics<double> contact(double overlap, const Vector& slip = Vector(0, 0, 0), double step = 1e-5) {
+  Kinematics<double> k{};
   k.overlap = overlap;
   k.reduced_radius = 0.005;
   k.reduced_mass = 0.005;
   k.reduced_inertia = 1e-7;
-  k.normal = Vec3::UnitZ();
+  k.normal = Vector(0, 0, 1);
   k.slip = slip;
-  k.mean_spin.setZero();
-  k.relative_spin.setZero();
   k.step = step;
   return k;
 }
@@ -87,14 +87,14 @@ TEST(LinearSpring, StiffnessOfImpactStoresTheHertzianEnergy) {
 
 TEST(Mindlin, SmallSlipIsAStiffSpringAndLargeSlipIsCoulombs) {
   const Mindlin::Parameters p{2e6, 0, 0.5};
-  Mindlin::History history;
-  const auto k = contact(1e-4, Vec3(1e-3, 0, 0));
+  SpringHistory<double> history{};
+  const auto k = contact(1e-4, Vector(1e-3, 0, 0));
   const double stiffness = 8 * 2e6 * std::sqrt(0.005 * 1e-4);
-  const Vec3 small = Mindlin::force<Hertz>(k, 100, p, {}, history);
-  EXPECT_NEAR(small[0], -stiffness * 1e-3 * k.step, 1e-12 * stiffness);
-  Vec3 force;
-  for (int step = 0; step < 100000; ++step) force = Mindlin::force<Hertz>(k, 2, p, {}, history);
-  EXPECT_NEAR(force.norm(), 1, 1e-12);
+  const auto small = Mindlin::force<Hertz>(k, 100.0, p, {}, history);
+  EXPECT_NEAR(small.x, -stiffness * 1e-3 * k.step, 1e-12 * stiffness);
+  Vector force;
+  for (int step = 0; step < 100000; ++step) force = Mindlin::force<Hertz>(k, 2.0, p, {}, history);
+  EXPECT_NEAR(force.vector().norm(), 1, 1e-12);
 }
 
 TEST(Mindlin, ClosedLoopsOfSlipAndOverlapNeverGiveEnergy) {
@@ -102,17 +102,16 @@ TEST(Mindlin, ClosedLoopsOfSlipAndOverlapNeverGiveEnergy) {
   // law (F = −S_t(δ) δ_t) fails this when it slips deep and comes back shallow.
   const Mindlin::Parameters p{2e6, 0, 1e9};  // sticks: nothing but the spring
   for (const double sense : {1.0, -1.0}) {
-    Mindlin::History history;
-    double tangential_work = 0;
-    Vec3 last = Vec3::Zero();
+    SpringHistory<double> history{};
+    double tangential_work = 0, last = 0;
     constexpr int steps = 20000;
     const double step = 1e-6;
     for (int n = 0; n < 5 * steps; ++n) {
       const double phase = sense * 2 * M_PI * n / steps;
       const double speed = 1e-5 * 2 * M_PI / (steps * step) * std::cos(phase) * sense;
-      const auto k = contact(1e-4 * (1.5 - std::cos(phase + 0.8)), Vec3(speed, 0, 0), step);
-      const Vec3 force = Mindlin::force<Hertz>(k, 1, p, {}, history);
-      tangential_work += 0.5 * (force + last)[0] * speed * step;
+      const auto k = contact(1e-4 * (1.5 - std::cos(phase + 0.8)), Vector(speed, 0, 0), step);
+      const double force = Mindlin::force<Hertz>(k, 1.0, p, {}, history).x;
+      tangential_work += 0.5 * (force + last) * speed * step;
       last = force;
     }
     // Stored energy at most ½ S_t δ_t² is the scale; the loops end where they began.
@@ -131,9 +130,9 @@ TEST(TangentialHistory, TurnsWithTheFrame) {
     auto k = contact(1e-4);
     for (int n = 0; n < steps; ++n) {
       normal = turn * normal;
-      k.normal = normal.normalized();
-      k.mean_spin = axis * (angle / k.step);
-      turn_with_frame(force, k);
+      k.normal = Vector(normal.normalized());
+      k.mean_spin = Vector(axis * (angle / k.step));
+      force = turned_with_frame(Vector(force), k).vector();
     }
     const Vec3 expected = Eigen::AngleAxisd(M_PI / 2, axis) * Vec3(0.3, 0.4, 0);
     EXPECT_LT((force - expected).norm(), 5e-4) << axis.transpose();
@@ -143,12 +142,76 @@ TEST(TangentialHistory, TurnsWithTheFrame) {
 
 TEST(ConstantTorque, OpposesTheRelativeSpinAndCannotReverseIt) {
   auto k = contact(1e-4);
-  k.relative_spin = Vec3(3, 4, 0);
-  const Vec3 torque = ConstantTorque::torque(k, 10, {0.05});
+  k.relative_spin = Vector(3, 4, 0);
+  const Vec3 torque = ConstantTorque::torque(k, 10.0, {0.05}).vector();
   EXPECT_NEAR((torque + 0.05 * 10 * k.reduced_radius * Vec3(0.6, 0.8, 0)).norm(), 0, 1e-15);
-  k.relative_spin *= 1e-9;
-  const Vec3 gentle = ConstantTorque::torque(k, 10, {0.05});
-  EXPECT_LT(gentle.norm() * k.step / k.reduced_inertia, k.relative_spin.norm());
+  k.relative_spin = Vector(3e-9, 4e-9, 0);
+  const Vec3 gentle = ConstantTorque::torque(k, 10.0, {0.05}).vector();
+  EXPECT_LT(gentle.norm() * k.step / k.reduced_inertia, 5e-9);
+  k.relative_spin = Vector(0, 0, 0);
+  EXPECT_EQ(ConstantTorque::torque(k, 10.0, {0.05}).vector().norm(), 0);
+}
+
+template <class Model>
+void expect_four_lanes_to_be_four_contacts() {
+  // Four different contacts, one of them sliding, one unloading, one at rest, computed together and one by one.
+  PairProperties pair;
+  pair.modulus = 7e6;
+  pair.shear_modulus = 2e6;
+  pair.stiffness = 1e4;
+  pair.stiffness_ratio = 3;
+  pair.hertz_damping = 0.4;
+  pair.damping_ratio = 0.2;
+  pair.friction = 0.3;
+  pair.rolling_friction = 0.05;
+  const auto p = Model::from(pair);
+  Kinematics<double> one[4];
+  SpringHistory<double> history[4];
+  Kinematics<Double4> all{};
+  SpringHistory<Double4> histories{};
+  for (int lane = 0; lane < 4; ++lane) {
+    auto& k = one[lane];
+    k = contact(1e-4 * (lane + 1), lane == 3 ? Vector(0, 0, 0) : Vector(0.1 * lane, 1e-3, 0));
+    k.closing_speed = 0.3 * (lane - 1);
+    k.mean_spin = Vector(1, lane, 2);
+    k.relative_spin = lane == 3 ? Vector(0, 0, 0) : Vector(lane, 1, 0);
+    history[lane] = {lane == 3 ? Vector(0, 0, 0) : Vector(0.01 * lane, -0.02, 0), lane == 1 ? 1e6 : 0.0};
+    const auto put = [lane](Double4& to, double value) { to.v[lane] = value; };
+    const auto put3 = [&](Vector3<Double4>& to, const Vector& value) {
+      put(to.x, value.x);
+      put(to.y, value.y);
+      put(to.z, value.z);
+    };
+    put(all.overlap, k.overlap);
+    put(all.closing_speed, k.closing_speed);
+    put(all.reduced_radius, k.reduced_radius);
+    put(all.reduced_mass, k.reduced_mass);
+    put(all.reduced_inertia, k.reduced_inertia);
+    put3(all.normal, k.normal);
+    put3(all.slip, k.slip);
+    put3(all.mean_spin, k.mean_spin);
+    put3(all.relative_spin, k.relative_spin);
+    put3(histories.force, history[lane].force);
+    put(histories.stiffness, history[lane].stiffness);
+    all.step = k.step;
+  }
+  const auto together = Model::respond(all, p, histories);
+  for (int lane = 0; lane < 4; ++lane) {
+    const auto alone = Model::respond(one[lane], p, history[lane]);
+    // The same operations in the same order, up to fused multiply-adds.
+    const auto near = [lane](const Vector3<Double4>& a, const Vector& b) {
+      EXPECT_NEAR((Vec3(a.x[lane], a.y[lane], a.z[lane]) - b.vector()).norm(), 0, 1e-13 * (1 + b.vector().norm())) << lane;
+    };
+    near(together.force, alone.force);
+    if constexpr (Model::has_rolling) near(together.torque, alone.torque);
+    if constexpr (Model::has_history) near(histories.force, history[lane].force);
+  }
+}
+
+TEST(FourLanes, AreFourContacts) {
+  expect_four_lanes_to_be_four_contacts<ContactModel<Hertz, Mindlin, ConstantTorque>>();
+  expect_four_lanes_to_be_four_contacts<ContactModel<Linear, LinearSlider, ConstantTorque>>();
+  expect_four_lanes_to_be_four_contacts<ContactModel<Hertz, Frictionless, FreeRolling>>();
 }
 
 }  // namespace

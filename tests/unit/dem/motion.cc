@@ -58,6 +58,21 @@ std::vector<Impact> impacts() {
 }
 INSTANTIATE_TEST_SUITE_P(EveryLawOnEveryPartner, HeadOn, testing::ValuesIn(impacts()));
 
+TEST(Restitution, RoundOffInTheSlipDoesNotTakeEnergy) {
+  // A regression: a stored force that was nothing but round-off, mostly normal, used to be stretched back to its length
+  // after its projection, step after step, up to Coulomb's limit; one impact in seven lost up to 0.005 of its speed.
+  Laws laws;
+  laws.restitution = 0.9;
+  const auto scene = scene_of(laws);
+  const double step = 0.01 * critical_step(scene).seconds;
+  for (int phase = 0; phase < 20; ++phase) {
+    const auto engine = engine_with(scene, {{Vec3(0, 0, radius + 1e-5 + 2e-7 * phase), Vec3(0, 0, -0.25)},
+                                            {Vec3(0, 0, -radius - 1e-5), Vec3(0, 0, 0.25)}});
+    engine->advance(static_cast<std::uint64_t>(0.02 / step), step);
+    EXPECT_NEAR((velocity(*engine, 0) - velocity(*engine, 1))[2] / 0.5, 0.9, 2e-4) << phase;
+  }
+}
+
 TEST(HertzImpact, PeakOverlapForceAndDurationAreHertzs) {
   Laws laws;
   laws.restitution = 1;

@@ -77,7 +77,7 @@ TEST(Reading, RefusesAMeshThatStopsInTheMiddle) {
   std::ifstream file(whole);
   const std::string text(std::istreambuf_iterator<char>(file), {});
   const auto path = write_file("half.msh", text.substr(0, text.size() / 2));
-  expect_in(failure(path), path + ": ");
+  expect_in(failure(path), "the file ends in the middle of a section");
 }
 
 TEST(Reading, RefusesAMeshOfSurfacesOnly) {
@@ -85,6 +85,42 @@ TEST(Reading, RefusesAMeshOfSurfacesOnly) {
                                "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n"
                                "3 0 1 0\n$EndNodes\n$Elements\n1\n1 2 2 1 1 1 2 3\n$EndElements\n");
   expect_in(failure(path), "Physical Volume");
+}
+
+TEST(Reading, SaysInWhichLineAMeshIsWrong) {
+  std::string text =
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
+      "$EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 5\n$EndElements\n";
+  expect_in(failure(write_file("node.msh", text)), "node.msh:13: there is no node 5.");
+  text.replace(text.find("1 4 2 1 1"), 9, "1 6 2 1 1");
+  expect_in(failure(write_file("prism.msh", text)), "prism.msh:13: prisms and pyramids");
+  text.replace(text.find("1 6 2 1 1"), 9, "1 11 2 1 1");
+  expect_in(failure(write_file("order.msh", text)), "Mesh.ElementOrder = 1");
+  text.replace(text.find("2 1 0 0"), 7, "2 1 0 a");
+  expect_in(failure(write_file("number.msh", text)), "number.msh:7: \"a\" is not a number.");
+}
+
+// The volume is the same whichever way gmsh counts the corners of a cell.
+TEST(Reading, TurnsLeftHandedCells) {
+  const auto mirror = [](const Vec3& p) { return Vec3(-p[0], p[1], p[2]); };
+  for (const bool tetrahedra : {false, true}) {
+    const Mesh mesh(write_block("mirrored", {.tetrahedra = tetrahedra, .move = mirror}), 1);
+    EXPECT_NEAR(mesh.volume(), 1, 1e-14);
+    EXPECT_EQ(mesh.boundary("x1").size(), tetrahedra ? 8u : 4u);
+  }
+}
+
+TEST(Reading, LetsAFaceBeInTwoGroups) {
+  const auto path = write_file(
+      "shared.msh",
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n2 1 \"base\"\n2 2 \"all\"\n"
+      "3 7 \"solid\"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+      "$Elements\n5\n1 2 2 1 1 1 2 3\n2 2 2 2 1 1 2 3\n3 2 2 2 1 1 2 4\n4 4 2 7 1 1 2 3 4\n"
+      "5 4 2 7 1 1 2 3 4\n$EndElements\n");
+  const Mesh mesh(path, 2);
+  EXPECT_EQ(mesh.cells(), 1u);
+  EXPECT_EQ(mesh.boundary("base").size(), 1u);
+  EXPECT_EQ(mesh.boundary("all").size(), 2u);
 }
 
 TEST(Reading, RefusesCellsFoldedOverThemselvesAndSaysWhere) {

@@ -1,0 +1,70 @@
+// Four doubles at a time. The only file that knows how: GCC's vector types, which become AVX where the build has it and
+// pairs of SSE2 registers where not. (std::experimental::simd has no gather and no permute.)
+#pragma once
+
+#include <cmath>
+
+#include "dem/particles.h"
+
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
+namespace acopla::dem {
+
+struct Mask4 {
+  using Vector = long long __attribute__((vector_size(32)));
+  Vector v;
+};
+
+struct Double4 {
+  using Vector = double __attribute__((vector_size(32)));
+  Vector v;
+  Double4() = default;
+  Double4(double all) : v{all, all, all, all} {}  // NOLINT: a scalar is meant to mix with vectors
+  explicit Double4(const Vector& vector) : v(vector) {}
+  double operator[](int lane) const { return v[lane]; }
+
+  friend Double4 operator+(const Double4& a, const Double4& b) { return Double4(a.v + b.v); }
+  friend Double4 operator-(const Double4& a, const Double4& b) { return Double4(a.v - b.v); }
+  friend Double4 operator*(const Double4& a, const Double4& b) { return Double4(a.v * b.v); }
+  friend Double4 operator/(const Double4& a, const Double4& b) { return Double4(a.v / b.v); }
+  friend Double4 operator-(const Double4& a) { return Double4(-a.v); }
+  friend Mask4 operator<(const Double4& a, const Double4& b) { return {a.v < b.v}; }
+  friend Mask4 operator>(const Double4& a, const Double4& b) { return {a.v > b.v}; }
+};
+
+/// Lane by lane: where the mask holds `yes`, else `no`. Both are computed.
+inline Double4 select(const Mask4& mask, const Double4& yes, const Double4& no) { return Double4(mask.v ? yes.v : no.v); }
+inline double select(bool mask, double yes, double no) { return mask ? yes : no; }
+
+inline Double4 max(const Double4& a, const Double4& b) { return Double4(a.v > b.v ? a.v : b.v); }
+inline Double4 min(const Double4& a, const Double4& b) { return Double4(a.v < b.v ? a.v : b.v); }
+
+inline Double4 sqrt(const Double4& a) {
+#ifdef __AVX__
+  return Double4(static_cast<Double4::Vector>(_mm256_sqrt_pd(static_cast<__m256d>(a.v))));
+#else
+  return Double4(Double4::Vector{std::sqrt(a.v[0]), std::sqrt(a.v[1]), std::sqrt(a.v[2]), std::sqrt(a.v[3])});
+#endif
+}
+
+/// Four records as four components: what four pairs need, in four loads and eight shuffles.
+struct Record4 {
+  Double4 x, y, z, w;
+};
+
+inline Record4 transposed(const Double4::Vector& a, const Double4::Vector& b, const Double4::Vector& c, const Double4::Vector& d) {
+  const Mask4::Vector even{0, 4, 2, 6}, odd{1, 5, 3, 7}, low{0, 1, 4, 5}, high{2, 3, 6, 7};
+  const auto ab_even = __builtin_shuffle(a, b, even), ab_odd = __builtin_shuffle(a, b, odd);
+  const auto cd_even = __builtin_shuffle(c, d, even), cd_odd = __builtin_shuffle(c, d, odd);
+  return {Double4(__builtin_shuffle(ab_even, cd_even, low)), Double4(__builtin_shuffle(ab_odd, cd_odd, low)),
+          Double4(__builtin_shuffle(ab_even, cd_even, high)), Double4(__builtin_shuffle(ab_odd, cd_odd, high))};
+}
+
+// A record is four aligned doubles, so it may be read and written as one vector.
+using RecordVector = double __attribute__((vector_size(32), may_alias));
+inline const RecordVector& as_vector(const Record& record) { return reinterpret_cast<const RecordVector&>(record); }
+inline RecordVector& as_vector(Record& record) { return reinterpret_cast<RecordVector&>(record); }
+
+}  // namespace acopla::dem

@@ -1,0 +1,365 @@
+#include "fem/gmsh.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <numeric>
+#include <unordered_map>
+
+#include "io/error.h"
+
+namespace acopla::fem {
+namespace {
+
+using geometry::Vec3;
+
+/// Words of a file, with the line they stand in.
+class Scanner {
+ public:
+  explicit Scanner(const std::string& path) : path_(path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw io::UserError(path + ": cannot be read.");
+    text_.assign(std::istreambuf_iterator<char>(file), {});
+  }
+
+  [[noreturn]] void fail(const std::string& sentence) const {
+    throw io::UserError(fmt::format("{}:{}: {}", path_, line_, sentence));
+  }
+  [[noreturn]] void fail_whole(const std::string& sentence) const {
+    throw io::UserError(fmt::format("{}: {}", path_, sentence));
+  }
+
+  bool at_end() {
+    skip_blanks();
+    return at_ == text_.size();
+  }
+  std::string_view word() {
+    if (at_end()) fail("the file ends in the middle of a section. Was it copied whole?");
+    const auto from = at_;
+    while (at_ < text_.size() && !is_blank(text_[at_])) ++at_;
+    return std::string_view(text_).substr(from, at_ - from);
+  }
+  double number() {
+    const auto text = word();
+    double value = 0;
+    const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (end.ec != std::errc() || end.ptr != text.data() + text.size() || !std::isfinite(value))
+      fail(fmt::format("\"{}\" is not a number.", text));
+    return value;
+  }
+  std::int64_t integer() {
+    const auto text = word();
+    std::int64_t value = 0;
+    const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (end.ec != std::errc() || end.ptr != text.data() + text.size())
+      fail(fmt::format("\"{}\" is not a whole number.", text));
+    return value;
+  }
+  /// A number of things to come: each takes two bytes of the file at least.
+  std::size_t count() {
+    const auto value = integer();
+    if (value < 0 || value > static_cast<std::int64_t>(text_.size()))
+      fail(fmt::format("{} is not a possible count.", value));
+    return static_cast<std::size_t>(value);
+  }
+  void expect(std::string_view wanted) {
+    const auto found = word();
+    if (found != wanted) fail(fmt::format("\"{}\" stands where {} is due.", found, wanted));
+  }
+  void skip_numbers(std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) number();
+  }
+  void skip_to(const std::string& marker) {
+    while (word() != marker) {
+    }
+  }
+
+ private:
+  static bool is_blank(char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
+  void skip_blanks() {
+    for (; at_ < text_.size() && is_blank(text_[at_]); ++at_) line_ += text_[at_] == '\n';
+  }
+
+  std::string path_, text_;
+  std::size_t at_ = 0;
+  int line_ = 1;
+};
+
+/// Number of nodes of an element type of gmsh that is read or passed over.
+std::size_t nodes_of_type(const Scanner& scanner, std::int64_t type) {
+  switch (type) {
+    case 15:
+      return 1;  // point
+    case 1:
+      return 2;  // line
+    case 2:
+      return 3;  // triangle
+    case 3:
+      return 4;  // quadrangle
+    case 4:
+      return 4;  // tetrahedron
+    case 5:
+      return 8;  // hexahedron
+    case 6:
+    case 7:
+      scanner.fail("prisms and pyramids cannot be used. Mesh with hexahedra or with tetrahedra.");
+    default:
+      scanner.fail(
+          fmt::format("elements of gmsh's type {} cannot be used. Save elements of first order "
+                      "(Mesh.ElementOrder = 1); `degree` in the case sets the order.",
+                      type));
+  }
+}
+
+class Reader {
+ public:
+  explicit Reader(const std::string& path) : in_(path) {}
+
+  GmshMesh read() {
+    while (!in_.at_end()) {
+      const std::string section(in_.word());
+      if (version_ == 0 && section != "$MeshFormat")
+        in_.fail_whole("is not a gmsh mesh: it does not begin with $MeshFormat.");
+      if (section.size() < 2 || section[0] != '$')
+        in_.fail(fmt::format("\"{}\" stands where a section should begin.", section));
+      if (section == "$MeshFormat") {
+        read_format();
+      } else if (section == "$Entities" && version_ >= 4) {
+        read_entities();
+      } else if (section == "$Nodes") {
+        version_ >= 4 ? read_nodes_4() : read_nodes_2();
+      } else if (section == "$Elements") {
+        version_ >= 4 ? read_elements_4() : read_elements_2();
+      } else {
+        in_.skip_to("$End" + section.substr(1));
+        continue;
+      }
+      in_.expect("$End" + section.substr(1));
+    }
+    finish();
+    return std::move(mesh_);
+  }
+
+ private:
+  void read_format() {
+    version_ = in_.number();
+    if (!(version_ >= 2 && version_ < 3) && version_ != 4.1)
+      in_.fail("version 2 or 4.1 of gmsh's format is needed. Save it with -format msh41.");
+    if (in_.integer() != 0) in_.fail("a binary mesh. Save it as ASCII (Mesh.Binary = 0).");
+    in_.integer();
+  }
+
+  void read_entities() {
+    std::size_t counts[4];
+    for (auto& count : counts) count = in_.count();
+    for (int dimension = 0; dimension < 4; ++dimension)
+      for (std::size_t i = 0; i < counts[dimension]; ++i) {
+        const auto tag = in_.integer();
+        in_.skip_numbers(dimension == 0 ? 3 : 6);
+        for (auto groups = in_.count(); groups > 0; --groups) {
+          const auto group = static_cast<int>(std::abs(in_.integer()));
+          if (dimension == 2) groups_of_surface_[tag].push_back(group);
+        }
+        if (dimension > 0) in_.skip_numbers(in_.count());
+      }
+  }
+
+  void add_node(std::int64_t tag, const Vec3& point) {
+    if (!index_of_.emplace(tag, static_cast<std::uint32_t>(mesh_.points.size())).second)
+      in_.fail(fmt::format("node {} is there twice.", tag));
+    mesh_.points.push_back(point);
+  }
+  Vec3 read_point() {
+    Vec3 point;
+    for (int d = 0; d < 3; ++d) {
+      point[d] = in_.number();
+      if (std::abs(point[d]) > 1e12) in_.fail(fmt::format("{:g} m is no place.", point[d]));
+    }
+    return point;
+  }
+  void read_nodes_2() {
+    for (auto left = in_.count(); left > 0; --left) {
+      const auto tag = in_.integer();
+      add_node(tag, read_point());
+    }
+  }
+  void read_nodes_4() {
+    const auto blocks = in_.count();
+    in_.skip_numbers(3);
+    for (std::size_t b = 0; b < blocks; ++b) {
+      const auto dimension = in_.integer();
+      in_.integer();
+      const bool parametric = in_.integer() != 0;
+      std::vector<std::int64_t> tags(in_.count());
+      for (auto& tag : tags) tag = in_.integer();
+      for (const auto tag : tags) {
+        add_node(tag, read_point());
+        if (parametric)
+          in_.skip_numbers(static_cast<std::size_t>(std::clamp<std::int64_t>(dimension, 0, 3)));
+      }
+    }
+  }
+
+  void read_elements_2() {
+    for (auto left = in_.count(); left > 0; --left) {
+      in_.integer();
+      const auto type = in_.integer();
+      const auto tags = in_.count();
+      int group = 0;
+      for (std::size_t t = 0; t < tags; ++t) {
+        const auto tag = in_.integer();
+        if (t == 0) group = static_cast<int>(std::abs(tag));
+      }
+      read_element(type, {group});
+    }
+  }
+  void read_elements_4() {
+    const auto blocks = in_.count();
+    in_.skip_numbers(3);
+    for (std::size_t b = 0; b < blocks; ++b) {
+      const auto dimension = in_.integer(), entity = in_.integer(), type = in_.integer();
+      const auto groups = dimension == 2 ? groups_of_surface_[entity] : std::vector<int>{};
+      for (auto left = in_.count(); left > 0; --left) {
+        in_.integer();
+        read_element(type, groups);
+      }
+    }
+  }
+
+  void read_element(std::int64_t type, const std::vector<int>& groups) {
+    std::array<std::uint32_t, 8> nodes{};
+    const auto count = nodes_of_type(in_, type);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto tag = in_.integer();
+      const auto found = index_of_.find(tag);
+      if (found == index_of_.end()) in_.fail(fmt::format("there is no node {}.", tag));
+      nodes[i] = found->second;
+    }
+    if (type == 2 || type == 3) {
+      FaceKey key{nodes[0], nodes[1], nodes[2], type == 3 ? nodes[3] : no_corner};
+      std::sort(key.begin(), key.end());
+      for (const int group : groups) mesh_.surfaces[group].push_back(key);
+    } else if (type == 4 || type == 5) {
+      add_cell(type == 4, nodes);
+    }
+  }
+
+  void add_cell(bool simplex, std::array<std::uint32_t, 8> nodes) {
+    if (!mesh_.cells.empty() && simplex != mesh_.simplex)
+      in_.fail("mixes hexahedra and tetrahedra. Use one of them alone.");
+    mesh_.simplex = simplex;
+    const auto p = [&](std::size_t i) -> const Vec3& { return mesh_.points[nodes[i]]; };
+    // Elements may be numbered left-handed; turn those.
+    if (simplex) {
+      if ((p(1) - p(0)).cross(p(2) - p(0)).dot(p(3) - p(0)) < 0) std::swap(nodes[0], nodes[1]);
+    } else {
+      const Vec3 below = p(0) + p(1) + p(2) + p(3), above = p(4) + p(5) + p(6) + p(7);
+      if ((p(2) - p(0)).cross(p(3) - p(1)).dot(above - below) < 0)
+        std::swap_ranges(nodes.begin(), nodes.begin() + 4, nodes.begin() + 4);
+    }
+    mesh_.cells.push_back(nodes);
+  }
+
+  std::size_t corners() const { return mesh_.simplex ? 4 : 8; }
+
+  void finish() {
+    if (mesh_.cells.empty())
+      in_.fail_whole(
+          "has no cells. Put the solid in a Physical Volume: gmsh saves named parts only.");
+    drop_repeated_cells();
+    check_faces();
+    drop_unused_points();
+    for (auto& [group, faces] : mesh_.surfaces) {
+      std::sort(faces.begin(), faces.end());
+      faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+    }
+  }
+
+  /// Version 2 writes a cell once for each physical volume that it is in.
+  void drop_repeated_cells() {
+    std::vector<std::pair<std::array<std::uint32_t, 8>, std::size_t>> sorted;
+    for (std::size_t c = 0; c < mesh_.cells.size(); ++c) {
+      auto nodes = mesh_.cells[c];
+      std::sort(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(corners()));
+      for (std::size_t i = 1; i < corners(); ++i)
+        if (nodes[i] == nodes[i - 1]) in_.fail_whole("has a cell with a corner twice.");
+      sorted.emplace_back(nodes, c);
+    }
+    std::sort(sorted.begin(), sorted.end());
+    std::vector<char> repeated(mesh_.cells.size(), 0);
+    for (std::size_t i = 1; i < sorted.size(); ++i)
+      if (sorted[i].first == sorted[i - 1].first) repeated[sorted[i].second] = 1;
+    std::size_t kept = 0;
+    for (std::size_t c = 0; c < mesh_.cells.size(); ++c)
+      if (!repeated[c]) mesh_.cells[kept++] = mesh_.cells[c];
+    mesh_.cells.resize(kept);
+  }
+
+  void check_faces() const {
+    static constexpr int of_hexahedron[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4},
+                                                {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
+    static constexpr int of_tetrahedron[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
+    std::vector<FaceKey> faces;
+    const auto add = [&](const auto& cell, const auto& corners_of_face) {
+      FaceKey key;
+      key.fill(no_corner);
+      std::transform(std::begin(corners_of_face), std::end(corners_of_face), key.begin(),
+                     [&](int corner) { return cell[static_cast<std::size_t>(corner)]; });
+      std::sort(key.begin(), key.end());
+      faces.push_back(key);
+    };
+    for (const auto& cell : mesh_.cells) {
+      if (mesh_.simplex)
+        for (const auto& face : of_tetrahedron) add(cell, face);
+      else
+        for (const auto& face : of_hexahedron) add(cell, face);
+    }
+    std::sort(faces.begin(), faces.end());
+    for (std::size_t i = 2; i < faces.size(); ++i)
+      if (faces[i] == faces[i - 2]) {
+        const auto& p = mesh_.points[faces[i][0]];
+        in_.fail_whole(fmt::format(
+            "has a face that three cells share, at ({:.6g}, {:.6g}, {:.6g}). Mesh it again.", p[0],
+            p[1], p[2]));
+      }
+  }
+
+  void drop_unused_points() {
+    constexpr auto unused = no_corner;
+    std::vector<std::uint32_t> number(mesh_.points.size(), unused);
+    for (const auto& cell : mesh_.cells)
+      for (std::size_t i = 0; i < corners(); ++i) number[cell[i]] = 0;
+    std::uint32_t kept = 0;
+    for (std::size_t n = 0; n < number.size(); ++n) {
+      if (number[n] == unused) continue;
+      mesh_.points[kept] = mesh_.points[n];
+      number[n] = kept++;
+    }
+    mesh_.points.resize(kept);
+    for (auto& cell : mesh_.cells)
+      for (std::size_t i = 0; i < corners(); ++i) cell[i] = number[cell[i]];
+    for (auto& [group, faces] : mesh_.surfaces)
+      for (auto& face : faces) {
+        for (auto& node : face)
+          if (node != no_corner) node = number[node];
+        std::sort(face.begin(), face.end());
+      }
+  }
+
+  Scanner in_;
+  double version_ = 0;
+  GmshMesh mesh_;
+  std::unordered_map<std::int64_t, std::uint32_t> index_of_;
+  std::unordered_map<std::int64_t, std::vector<int>> groups_of_surface_;
+};
+
+}  // namespace
+
+GmshMesh read_gmsh(const std::string& path) { return Reader(path).read(); }
+
+}  // namespace acopla::fem
