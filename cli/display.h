@@ -8,7 +8,8 @@
 
 namespace acopla::cli {
 
-/// Progress: one line rewritten on a terminal, plain lines (every 2 s or 10 %, whichever is later) elsewhere.
+/// Progress: one line rewritten on a terminal, plain lines (every 2 s or 10 %, whichever is later)
+/// elsewhere.
 class Progress {
  public:
   Progress();
@@ -23,9 +24,10 @@ class Progress {
   double last_fraction_ = 0;
 };
 
-/// The table at the end. @param outcome  the coupler's last event (coupler/outcome.h); @param start_up  seconds until the
-/// first window began; @param results  the folder
-std::string final_table(const nlohmann::ordered_json& outcome, double start_up, const std::string& results);
+/// The table at the end. @param outcome  the coupler's last event (coupler/outcome.h); @param
+/// start_up  seconds until the first window began; @param results  the folder
+std::string final_table(const nlohmann::ordered_json& outcome, double start_up,
+                        const std::string& results);
 
 /// Path as short as it can be said from the present folder.
 std::string shown_path(const std::string& path);

@@ -12,7 +12,8 @@ namespace acopla::cli {
 namespace {
 
 // Asks every solver for what it says of its own table. @return the worst exit code
-int ask_participants(const coupler::Case& read, const std::string& case_file, const std::string& option) {
+int ask_participants(const coupler::Case& read, const std::string& case_file,
+                     const std::string& option) {
   int worst = io::exit_done;
   for (const auto& participant : read.participants) {
     std::fflush(stdout);
@@ -38,11 +39,14 @@ int ask_participants(const coupler::Case& read, const std::string& case_file, co
 std::string loads_text(const coupler::Case& read) {
   switch (read.loads) {
     case coupler::Loads::history:
-      return fmt::format("every window from {:.6g} s on is sent to the receivers", read.time(read.loads_from));
+      return fmt::format("every window from {:.6g} s on is sent to the receivers",
+                         read.time(read.loads_from));
     case coupler::Loads::mean:
-      return fmt::format("receivers get the mean from {:.6g} s to {:.6g} s, once", read.time(read.load_start), read.time(read.load_end));
+      return fmt::format("receivers get the mean from {:.6g} s to {:.6g} s, once",
+                         read.time(read.load_start), read.time(read.load_end));
     case coupler::Loads::snapshot:
-      return fmt::format("receivers get the window that ends at {:.6g} s, once", read.time(read.load_end));
+      return fmt::format("receivers get the window that ends at {:.6g} s, once",
+                         read.time(read.load_end));
   }
   return "";
 }
@@ -58,12 +62,16 @@ int check(const std::string& case_file) {
 
 int explain(const std::string& case_file) {
   const auto read = coupler::read_case(io::Table::from_file(case_file));
-  fmt::print("{}: {} dimensions, {:.6g} s in {} windows of {:.6g} s\n", read.title, read.dimension, read.end, read.windows, read.window);
+  fmt::print("{}: {} dimensions, {:.6g} s in {} windows of {:.6g} s\n", read.title, read.dimension,
+             read.end, read.windows, read.window);
   fmt::print("one-way coupling; {}\n", loads_text(read));
   for (const auto& interface : read.interfaces)
-    fmt::print("  forces of {}, mapped conservatively, at most {:.6g} m apart\n", interface.text(), read.max_distance);
-  fmt::print("pictures of the loaded surfaces every {:.6g} s; everything else in interface.h5, every window\n",
-             read.time(read.output_every));
+    fmt::print("  forces of {}, mapped conservatively, at most {:.6g} m apart\n", interface.text(),
+               read.max_distance);
+  fmt::print(
+      "pictures of the loaded surfaces every {:.6g} s; everything else in interface.h5, every "
+      "window\n",
+      read.time(read.output_every));
   for (const auto& expectation : read.expectations)
     fmt::print("expected: {} = {:.10g}, {} tolerance {:.3g}\n", expectation.name, expectation.value,
                expectation.relative ? "relative" : "absolute", expectation.tolerance);

@@ -1,4 +1,5 @@
-// acopla check and acopla explain: the coupler's part of a case here, each participant's by its own executable.
+// acopla check and acopla explain: the coupler's part of a case here, each participant's by its own
+// executable.
 #pragma once
 
 #include <string>

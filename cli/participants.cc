@@ -23,42 +23,56 @@ std::vector<std::string> solvers_beside_us() {
 }
 
 std::string solver_path(const coupler::ParticipantCase& participant) {
-  const bool is_name = participant.solver.find('/') == std::string::npos && !participant.solver.empty();
+  const bool is_name =
+      participant.solver.find('/') == std::string::npos && !participant.solver.empty();
   const auto path = own_folder() + "/acopla-" + participant.solver;
   if (is_name && participant.solver != "coupler" && !find_program(path, "").empty()) return path;
   const auto known = solvers_beside_us();
   const auto near = io::nearest_word(participant.solver, known);
-  throw io::UserError(participant.at, fmt::format("{}.solver = \"{}\" is not a solver of this build. {}", participant.name,
-                                                  participant.solver,
-                                                  near            ? fmt::format("Did you mean \"{}\"?", *near)
-                                                  : known.empty() ? std::string("It has none.")
-                                                                  : fmt::format("There are: {}.", fmt::join(known, ", "))));
+  throw io::UserError(
+      participant.at,
+      fmt::format("{}.solver = \"{}\" is not a solver of this build. {}", participant.name,
+                  participant.solver,
+                  near            ? fmt::format("Did you mean \"{}\"?", *near)
+                  : known.empty() ? std::string("It has none.")
+                                  : fmt::format("There are: {}.", fmt::join(known, ", "))));
 }
 
 }  // namespace
 
-Command command_of(const coupler::ParticipantCase& participant, const std::string& case_file, const std::string& endpoint) {
+Command command_of(const coupler::ParticipantCase& participant, const std::string& case_file,
+                   const std::string& endpoint) {
   Command command;
   const auto full = fs::absolute(case_file).lexically_normal();
-  command.environment = {{"ACOPLA_ENDPOINT", endpoint}, {"ACOPLA_PARTICIPANT", participant.name}, {"ACOPLA_CASE", full.string()}};
+  command.environment = {{"ACOPLA_ENDPOINT", endpoint},
+                         {"ACOPLA_PARTICIPANT", participant.name},
+                         {"ACOPLA_CASE", full.string()}};
   if (!participant.solver.empty()) {
     command.words = {solver_path(participant), case_file, "--as", participant.name};
     if (!endpoint.empty()) command.words.insert(command.words.end(), {"--connect", endpoint});
     return command;
   }
   command.words = participant.command;
-  command.folder = full.parent_path().string();  // a script beside the case is named as it is written there
+  command.folder =
+      full.parent_path().string();  // a script beside the case is named as it is written there
   if (find_program(command.words.front(), command.folder).empty())
-    throw io::UserError(participant.at, fmt::format("{}.command names \"{}\", which is not a program that can be started. Check its "
-                                                    "name, and that it may be executed.", participant.name, command.words.front()));
+    throw io::UserError(
+        participant.at,
+        fmt::format(
+            "{}.command names \"{}\", which is not a program that can be started. Check its "
+            "name, and that it may be executed.",
+            participant.name, command.words.front()));
   return command;
 }
 
-Command coupler_command(const std::string& case_file, const std::optional<coupler::Substitute>& substitute) {
+Command coupler_command(const std::string& case_file,
+                        const std::optional<coupler::Substitute>& substitute) {
   Command command;
   command.words = {own_folder() + "/acopla-coupler", case_file};
   if (!substitute) return command;
-  const auto add = [&](const char* option, const std::string& value) { command.words.insert(command.words.end(), {option, value}); };
+  const auto add = [&](const char* option, const std::string& value) {
+    command.words.insert(command.words.end(), {option, value});
+  };
   const auto& replay = substitute->replay;
   add("--replay", replay.file);
   if (!substitute->participant.empty()) add("--replay-as", substitute->participant);

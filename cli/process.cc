@@ -45,8 +45,10 @@ void use_as(int descriptor, int target) {
 std::string path_or_explain(const Command& command) {
   auto path = find_program(command.words.front(), command.folder.empty() ? "." : command.folder);
   if (path.empty())
-    throw io::UserError(fmt::format("{} cannot be started: there is no such program. Check its name, and that it may be executed.",
-                                    command.words.front()));
+    throw io::UserError(
+        fmt::format("{} cannot be started: there is no such program. Check its name, and that it "
+                    "may be executed.",
+                    command.words.front()));
   return path;
 }
 
@@ -64,7 +66,8 @@ std::string find_program(const std::string& word, const std::string& folder) {
   const char* search = std::getenv("PATH");
   std::stringstream folders(search ? search : "/usr/bin:/bin");
   for (std::string entry; std::getline(folders, entry, ':');)
-    if (const auto path = fs::absolute(fs::path(entry.empty() ? "." : entry) / word); usable(path)) return path.string();
+    if (const auto path = fs::absolute(fs::path(entry.empty() ? "." : entry) / word); usable(path))
+      return path.string();
   return "";
 }
 
@@ -72,7 +75,8 @@ std::string own_folder() { return fs::read_symlink("/proc/self/exe").parent_path
 
 std::string describe_exit(int wait_status) {
   if (WIFSIGNALED(wait_status))
-    return fmt::format("was killed by signal {} ({})", WTERMSIG(wait_status), strsignal(WTERMSIG(wait_status)));
+    return fmt::format("was killed by signal {} ({})", WTERMSIG(wait_status),
+                       strsignal(WTERMSIG(wait_status)));
   return fmt::format("ended with exit code {}", WEXITSTATUS(wait_status));
 }
 
@@ -105,7 +109,9 @@ Child::Child(std::string name, std::string program, const Command& command, cons
     : name_(std::move(name)), program_(std::move(program)), log_(streams.log) {
   const auto path = path_or_explain(command);
   const int log = open(streams.log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (log < 0) throw io::UserError({streams.log, 0, 0}, "the log cannot be written. Check the folder and the free space.");
+  if (log < 0)
+    throw io::UserError({streams.log, 0, 0},
+                        "the log cannot be written. Check the folder and the free space.");
   const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
   const pid_t launcher = getpid();
   pid_ = fork();
@@ -120,7 +126,9 @@ Child::Child(std::string name, std::string program, const Command& command, cons
   }
   close(log);
   close(nothing);
-  if (pid_ < 0) throw std::runtime_error(fmt::format("{} cannot be started: {}", program_, std::strerror(errno)));
+  if (pid_ < 0)
+    throw std::runtime_error(
+        fmt::format("{} cannot be started: {}", program_, std::strerror(errno)));
   setpgid(pid_, pid_);  // here and in the child: whoever comes first
 }
 
@@ -146,7 +154,8 @@ bool Child::look() {
 
 std::optional<std::chrono::milliseconds> Child::stopped_for() const {
   if (!stopped_) return std::nullopt;
-  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() - *stopped_);
+  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() -
+                                                               *stopped_);
 }
 
 void Child::kill_group() const {

@@ -12,13 +12,13 @@
 namespace acopla::cli {
 
 struct Command {
-  std::vector<std::string> words;  ///< program and arguments
+  std::vector<std::string> words;                                ///< program and arguments
   std::vector<std::pair<std::string, std::string>> environment;  ///< added to ours
-  std::string folder;              ///< to run in; empty: the present one
+  std::string folder;  ///< to run in; empty: the present one
 };
 
-/// The path of a program: as written where it holds a slash (relative to `folder`), else searched for in PATH.
-/// Empty when there is none that may be executed.
+/// The path of a program: as written where it holds a slash (relative to `folder`), else searched
+/// for in PATH. Empty when there is none that may be executed.
 std::string find_program(const std::string& word, const std::string& folder);
 /// The folder of the running executable, where acopla-coupler and the solvers stand.
 std::string own_folder();
@@ -28,14 +28,16 @@ std::string describe_exit(int wait_status);
 /// The last lines of a text file that are not empty, oldest first.
 std::vector<std::string> last_lines(const std::string& path, std::size_t count);
 
-/// Runs a command with our own standard streams and waits for it. @return its exit code; 1 when a signal killed it
+/// Runs a command with our own standard streams and waits for it. @return its exit code; 1 when a
+/// signal killed it
 int run_and_wait(const Command& command);
 
 /// A child in a process group of its own that dies with the launcher, whatever kills the launcher.
 class Child {
  public:
   struct Streams {
-    std::string log;  ///< file that standard error, and output where it goes nowhere else, are written to
+    std::string
+        log;  ///< file that standard error, and output where it goes nowhere else, are written to
     int input = -1;   ///< descriptor for the standard input; −1: nothing
     int output = -1;  ///< descriptor for the standard output; −1: the log
   };

@@ -34,11 +34,13 @@ using coupler::Notice;
 using namespace std::chrono_literals;
 
 constexpr auto turn = 50ms;
-constexpr auto stop_limit = 1000ms;       // a process stopped for longer is taken for frozen; a debugger's touch is shorter
+constexpr auto stop_limit =
+    1000ms;  // a process stopped for longer is taken for frozen; a debugger's touch is shorter
 constexpr auto heartbeat_limit = 1750ms;  // of the coupler's silence
-constexpr auto own_gap = 500ms;           // longer between two turns: this process itself was stopped
-constexpr auto grace_well = 20000ms;      // for participants to write and end after a run that went well
-constexpr auto grace_ill = 1000ms;        // and after one that did not
+constexpr auto own_gap = 500ms;  // longer between two turns: this process itself was stopped
+constexpr auto grace_well =
+    20000ms;                        // for participants to write and end after a run that went well
+constexpr auto grace_ill = 1000ms;  // and after one that did not
 constexpr auto interrupt_limit = 3000ms;  // for the coupler to close its files after Ctrl-C
 constexpr std::size_t words_shown = 5;
 
@@ -98,7 +100,9 @@ class Launch {
   int report_lost();
   void print_last_words(const std::string& participant) const;
   void print_where_results_are(std::int64_t windows, double time) const;
-  std::string log_of(const std::string& name) const { return fmt::format("{}/log/{}.log", results_, name); }
+  std::string log_of(const std::string& name) const {
+    return fmt::format("{}/log/{}.log", results_, name);
+  }
   Child& coupler() { return *children_.front(); }
 
   const RunOptions& options_;
@@ -135,11 +139,14 @@ void Launch::start() {
 
 void Launch::start_coupler() {
   std::array<int, 2> input, output;
-  if (pipe2(input.data(), O_CLOEXEC) != 0 || pipe2(output.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe can be made");
+  if (pipe2(input.data(), O_CLOEXEC) != 0 || pipe2(output.data(), O_CLOEXEC) != 0)
+    throw std::runtime_error("no pipe can be made");
   auto command = coupler_command(options_.case_file, options_.substitute);
-  command.words.insert(command.words.end(), {"--bind", workplace_.endpoint(), "--results", results_, "--supervised"});
-  children_.push_back(std::make_unique<Child>("coupler", "acopla-coupler", command,
-                                              Child::Streams{log_of("coupler"), input[0], output[1]}));
+  command.words.insert(command.words.end(),
+                       {"--bind", workplace_.endpoint(), "--results", results_, "--supervised"});
+  children_.push_back(
+      std::make_unique<Child>("coupler", "acopla-coupler", command,
+                              Child::Streams{log_of("coupler"), input[0], output[1]}));
   close(input[0]);
   close(output[1]);
   to_coupler_ = input[1];
@@ -157,7 +164,8 @@ bool Launch::over() const {
 
 void Launch::wait() {
   std::array<pollfd, 2> events{pollfd{signals_, POLLIN, 0}, pollfd{from_coupler_, POLLIN, 0}};
-  poll(events.data(), from_coupler_ >= 0 ? 2 : 1, static_cast<int>(std::chrono::milliseconds(turn).count()));
+  poll(events.data(), from_coupler_ >= 0 ? 2 : 1,
+       static_cast<int>(std::chrono::milliseconds(turn).count()));
   const auto now = Clock::now();
   if (now - last_turn_ > own_gap) last_beat_ = now;  // we were stopped, not the coupler
   last_turn_ = now;
@@ -184,7 +192,8 @@ void Launch::read_coupler() {
   if (from_coupler_ < 0) return;
   std::array<char, 4096> buffer;
   ssize_t count;
-  while ((count = read(from_coupler_, buffer.data(), buffer.size())) > 0) unfinished_.append(buffer.data(), static_cast<std::size_t>(count));
+  while ((count = read(from_coupler_, buffer.data(), buffer.size())) > 0)
+    unfinished_.append(buffer.data(), static_cast<std::size_t>(count));
   if (count == 0) {
     close(from_coupler_);
     from_coupler_ = -1;
@@ -202,7 +211,8 @@ void Launch::hear(const Json& event) {
   if (kind == "progress") {
     time_ = event.at("time").get<double>();
     windows_ = event.at("window").get<std::int64_t>();
-    progress_.show(windows_, event.at("windows").get<std::int64_t>(), time_, event.at("seconds").get<double>());
+    progress_.show(windows_, event.at("windows").get<std::int64_t>(), time_,
+                   event.at("seconds").get<double>());
   }
   if (kind == "done") {
     outcome_ = event;
@@ -219,9 +229,11 @@ void Launch::look_after_children() {
         child->kill_group();  // it would not heed anything gentler
       } else if (child.get() == &coupler()) {
         lose_coupler("was stopped by a signal");
-      } else if (std::find(told_stopped_.begin(), told_stopped_.end(), child->name()) == told_stopped_.end()) {
+      } else if (std::find(told_stopped_.begin(), told_stopped_.end(), child->name()) ==
+                 told_stopped_.end()) {
         told_stopped_.push_back(child->name());
-        tell_coupler({Notice::Kind::stopped, child->name(), "is frozen (it was stopped by a signal)", false, ""});
+        tell_coupler({Notice::Kind::stopped, child->name(),
+                      "is frozen (it was stopped by a signal)", false, ""});
       }
     }
   }
@@ -234,9 +246,11 @@ void Launch::child_ended(Child& child) {
     if (outcome_.is_null()) lose_coupler(describe_exit(child.status()));
     return;
   }
-  const bool mistake = WIFEXITED(child.status()) && WEXITSTATUS(child.status()) == io::exit_user_error;
+  const bool mistake =
+      WIFEXITED(child.status()) && WEXITSTATUS(child.status()) == io::exit_user_error;
   const auto words = mistake ? last_lines(child.log(), 1) : std::vector<std::string>{};
-  tell_coupler({Notice::Kind::exited, child.name(), describe_exit(child.status()), mistake, words.empty() ? "" : words.front()});
+  tell_coupler({Notice::Kind::exited, child.name(), describe_exit(child.status()), mistake,
+                words.empty() ? "" : words.front()});
 }
 
 void Launch::look_after_coupler() {
@@ -258,10 +272,15 @@ void Launch::tell_coupler(const Notice& notice) {
 // The coupler can neither end the others nor write the summary: we do.
 void Launch::lose_coupler(const std::string& how) {
   if (lost_) return;
-  const auto state = windows_ == 0 ? std::string("starting") : fmt::format("after window {} of {}, at {:.6g} s", windows_, case_.windows, time_);
-  lost_ = Lost{"coupler", state, fmt::format("the coupler (acopla-coupler) {} {}.", how, windows_ == 0 ? "while starting" : state)};
+  const auto state = windows_ == 0 ? std::string("starting")
+                                   : fmt::format("after window {} of {}, at {:.6g} s", windows_,
+                                                 case_.windows, time_);
+  lost_ = Lost{"coupler", state,
+               fmt::format("the coupler (acopla-coupler) {} {}.", how,
+                           windows_ == 0 ? "while starting" : state)};
   const auto words = last_lines(log_of("coupler"), 1);
-  if (!coupler().running() && WIFEXITED(coupler().status()) && WEXITSTATUS(coupler().status()) == io::exit_user_error && !words.empty()) {
+  if (!coupler().running() && WIFEXITED(coupler().status()) &&
+      WEXITSTATUS(coupler().status()) == io::exit_user_error && !words.empty()) {
     lost_->message = words.front();
     lost_->exit_code = io::exit_user_error;
   }
@@ -285,14 +304,17 @@ int Launch::report_outcome() {
     fmt::print("{}", final_table(outcome_, start_up_, results_));
     for (const auto& child : children_)
       if (child->status() != 0 && child.get() != &coupler())
-        fmt::print(stderr, "warning: the run is complete, but then {} ({}) {}; see {}\n", child->name(), child->program(),
-                   describe_exit(child->status()), shown_path(child->log()));
+        fmt::print(stderr, "warning: the run is complete, but then {} ({}) {}; see {}\n",
+                   child->name(), child->program(), describe_exit(child->status()),
+                   shown_path(child->log()));
     return outcome_.at("exit_code").get<int>();
   }
   const int exit_code = outcome_.at("exit_code").get<int>();
-  if (exit_code != io::exit_interrupted) fmt::print(stderr, "{}\n", error.at("message").get<std::string>());
+  if (exit_code != io::exit_interrupted)
+    fmt::print(stderr, "{}\n", error.at("message").get<std::string>());
   if (exit_code == io::exit_failure) print_last_words(error.at("participant").get<std::string>());
-  print_where_results_are(outcome_.at("time").at("windows").get<std::int64_t>(), outcome_.at("time").at("reached").get<double>());
+  print_where_results_are(outcome_.at("time").at("windows").get<std::int64_t>(),
+                          outcome_.at("time").at("reached").get<double>());
   return exit_code;
 }
 
@@ -324,7 +346,8 @@ void Launch::print_last_words(const std::string& participant) const {
     if (child->name() != participant) continue;
     const auto words = last_lines(child->log(), words_shown);
     if (words.empty()) continue;
-    fmt::print(stderr, "Its last words ({}):\n  {}\n", shown_path(child->log()), fmt::join(words, "\n  "));
+    fmt::print(stderr, "Its last words ({}):\n  {}\n", shown_path(child->log()),
+               fmt::join(words, "\n  "));
   }
 }
 

@@ -10,7 +10,7 @@ namespace acopla::cli {
 
 struct RunOptions {
   std::string case_file;
-  std::string results;                             ///< empty: results/NAME-NNN
+  std::string results;                            ///< empty: results/NAME-NNN
   std::optional<coupler::Substitute> substitute;  ///< acopla replay
 };
 

@@ -29,7 +29,8 @@ void remove_stale() {
     pid_t pid = 0;
     const auto* begin = name.data() + std::strlen(prefix);
     const auto [end, failure] = std::from_chars(begin, name.data() + name.size(), pid);
-    if (failure != std::errc{} || end == name.data() + name.size() || *end != '-' || pid <= 0) continue;
+    if (failure != std::errc{} || end == name.data() + name.size() || *end != '-' || pid <= 0)
+      continue;
     if (kill(pid, 0) != 0 && errno == ESRCH) {
       std::error_code ignored;  // another user's, perhaps
       fs::remove_all(entry.path(), ignored);
@@ -76,7 +77,8 @@ Workplace::Workplace() {
   remove_stale();
   auto pattern = fmt::format("/tmp/{}{}-XXXXXX", prefix, getpid());
   if (!mkdtemp(pattern.data()))  // mode 0700
-    throw std::runtime_error(fmt::format("no private folder can be made in /tmp: {}", std::strerror(errno)));
+    throw std::runtime_error(
+        fmt::format("no private folder can be made in /tmp: {}", std::strerror(errno)));
   folder_ = pattern;
 }
 
@@ -108,7 +110,8 @@ void Guard::forget_group(pid_t group) { tell(fmt::format("-{}\n", group)); }
 void Guard::watch_folder(const std::string& folder) { tell(fmt::format("d{}\n", folder)); }
 
 void Guard::tell(const std::string& line) const {
-  if (write(pipe_, line.data(), line.size()) < 0) return;  // killed itself: the children still die with their parent
+  if (write(pipe_, line.data(), line.size()) < 0)
+    return;  // killed itself: the children still die with their parent
 }
 
 }  // namespace acopla::cli

@@ -1,5 +1,5 @@
-// What a run needs beside its results: a private folder for its sockets, and somebody who cleans up after a launcher that
-// was killed.
+// What a run needs beside its results: a private folder for its sockets, and somebody who cleans up
+// after a launcher that was killed.
 #pragma once
 
 #include <sys/types.h>
@@ -8,7 +8,8 @@
 
 namespace acopla::cli {
 
-/// A folder /tmp/acopla-PID-XXXXXX that only we may enter; removed at the end. Making it removes those of dead launchers.
+/// A folder /tmp/acopla-PID-XXXXXX that only we may enter; removed at the end. Making it removes
+/// those of dead launchers.
 class Workplace {
  public:
   Workplace();
@@ -22,8 +23,8 @@ class Workplace {
   std::string folder_;
 };
 
-/// A small process that outlives a launcher killed without warning, and then ends whatever the launcher had started,
-/// grandchildren too. Make it before anything else is opened or started.
+/// A small process that outlives a launcher killed without warning, and then ends whatever the
+/// launcher had started, grandchildren too. Make it before anything else is opened or started.
 class Guard {
  public:
   Guard();

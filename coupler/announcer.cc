@@ -21,12 +21,18 @@ void print_line(const std::string& line) {
 
 }  // namespace
 
-void PlainAnnouncer::ready(const std::string& endpoint) { print_line(fmt::format("coupler open at {}", endpoint)); }
+void PlainAnnouncer::ready(const std::string& endpoint) {
+  print_line(fmt::format("coupler open at {}", endpoint));
+}
 
-void PlainAnnouncer::assembled(double seconds) { print_line(fmt::format("everybody is there after {:.2f} s", seconds)); }
+void PlainAnnouncer::assembled(double seconds) {
+  print_line(fmt::format("everybody is there after {:.2f} s", seconds));
+}
 
-void PlainAnnouncer::progress(std::int64_t window, std::int64_t windows, double time, double seconds) {
-  print_line(fmt::format("window {} of {}, t = {:.6g} s, after {:.1f} s", window, windows, time, seconds));
+void PlainAnnouncer::progress(std::int64_t window, std::int64_t windows, double time,
+                              double seconds) {
+  print_line(
+      fmt::format("window {} of {}, t = {:.6g} s, after {:.1f} s", window, windows, time, seconds));
 }
 
 void PlainAnnouncer::note(const std::string& text) { print_line(text); }
@@ -34,10 +40,12 @@ void PlainAnnouncer::note(const std::string& text) { print_line(text); }
 void PlainAnnouncer::done(const Outcome& outcome) {
   if (outcome.error) print_line(outcome.error->message);
   for (const auto& checked : outcome.expectations)
-    print_line(fmt::format("{} = {}, expected {:.10g}: {}", checked.expectation.name,
-                           checked.value ? fmt::format("{:.10g}", *checked.value) : "never reported", checked.expectation.value,
-                           checked.met ? "met" : "missed"));
-  print_line(fmt::format("{} after {:.2f} s, {} windows complete", name_of(outcome.status), outcome.seconds, outcome.windows));
+    print_line(
+        fmt::format("{} = {}, expected {:.10g}: {}", checked.expectation.name,
+                    checked.value ? fmt::format("{:.10g}", *checked.value) : "never reported",
+                    checked.expectation.value, checked.met ? "met" : "missed"));
+  print_line(fmt::format("{} after {:.2f} s, {} windows complete", name_of(outcome.status),
+                         outcome.seconds, outcome.windows));
 }
 
 SupervisedAnnouncer::SupervisedAnnouncer() : thread_([this] { beat(); }) {}
@@ -60,7 +68,8 @@ void SupervisedAnnouncer::beat() {
   }
 }
 
-// A launcher that was stopped (Ctrl-Z) must not stop the run: what is not vital is dropped while nobody reads.
+// A launcher that was stopped (Ctrl-Z) must not stop the run: what is not vital is dropped while
+// nobody reads.
 void SupervisedAnnouncer::say(const std::string& line, bool must) {
   const std::lock_guard lock(mutex_);
   pollfd room{STDOUT_FILENO, POLLOUT, 0};
@@ -78,10 +87,18 @@ void SupervisedAnnouncer::ready(const std::string& endpoint) {
   say(dump({{"event", "ready"}, {"endpoint", endpoint}}), true);
 }
 
-void SupervisedAnnouncer::assembled(double seconds) { say(dump({{"event", "assembled"}, {"seconds", seconds}}), false); }
+void SupervisedAnnouncer::assembled(double seconds) {
+  say(dump({{"event", "assembled"}, {"seconds", seconds}}), false);
+}
 
-void SupervisedAnnouncer::progress(std::int64_t window, std::int64_t windows, double time, double seconds) {
-  say(dump({{"event", "progress"}, {"window", window}, {"windows", windows}, {"time", time}, {"seconds", seconds}}), false);
+void SupervisedAnnouncer::progress(std::int64_t window, std::int64_t windows, double time,
+                                   double seconds) {
+  say(dump({{"event", "progress"},
+            {"window", window},
+            {"windows", windows},
+            {"time", time},
+            {"seconds", seconds}}),
+      false);
 }
 
 void SupervisedAnnouncer::note(const std::string& text) { fmt::print(stderr, "{}\n", text); }

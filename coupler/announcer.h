@@ -21,8 +21,8 @@ class PlainAnnouncer final : public Reporter {
   void done(const Outcome& outcome) override;
 };
 
-/// One JSON object a line, and a heartbeat every quarter second from a thread of its own, so that the launcher sees a
-/// frozen coupler. Notes go to the standard error, which is the coupler's log.
+/// One JSON object a line, and a heartbeat every quarter second from a thread of its own, so that
+/// the launcher sees a frozen coupler. Notes go to the standard error, which is the coupler's log.
 class SupervisedAnnouncer final : public Reporter {
  public:
   SupervisedAnnouncer();

@@ -10,18 +10,28 @@
 namespace acopla::coupler {
 namespace {
 
-const std::vector<std::string> reserved{"title", "dimension", "gravity", "end", "coupling", "expect", "plugins"};
+const std::vector<std::string> reserved{"title",    "dimension", "gravity", "end",
+                                        "coupling", "expect",    "plugins"};
 
-// A time as a number of windows; anything but a whole number is refused with the values that would do.
-std::int64_t whole_windows(const io::Table& table, std::string_view key, double seconds, double window) {
+// A time as a number of windows; anything but a whole number is refused with the values that would
+// do.
+std::int64_t whole_windows(const io::Table& table, std::string_view key, double seconds,
+                           double window) {
   const double exact = seconds / window;
-  if (exact > 1e12) table.fail(key, fmt::format("= {:.10g} s is {:.3g} windows, more than this program can count.", seconds, exact));
+  if (exact > 1e12)
+    table.fail(key, fmt::format("= {:.10g} s is {:.3g} windows, more than this program can count.",
+                                seconds, exact));
   const auto count = std::llround(exact);
-  if (std::abs(static_cast<double>(count) * window - seconds) <= 1e-9 * std::max(seconds, window)) return count;
+  if (std::abs(static_cast<double>(count) * window - seconds) <= 1e-9 * std::max(seconds, window))
+    return count;
   const double low = std::floor(exact), high = std::ceil(exact);
-  table.fail(key, fmt::format("= {:.10g} s is {:.10g} windows of {:.10g} s, not a whole number. Use {}{:.10g} s{}.", seconds,
-                              exact, window, low > 0 ? fmt::format("{:.10g} s or ", low * window) : "", high * window,
-                              key == "end" ? fmt::format(", or coupling.window = {:.10g}", seconds / high) : ""));
+  table.fail(
+      key,
+      fmt::format(
+          "= {:.10g} s is {:.10g} windows of {:.10g} s, not a whole number. Use {}{:.10g} s{}.",
+          seconds, exact, window, low > 0 ? fmt::format("{:.10g} s or ", low * window) : "",
+          high * window,
+          key == "end" ? fmt::format(", or coupling.window = {:.10g}", seconds / high) : ""));
 }
 
 ReplayCase read_replay(const io::Table& table) {
@@ -35,7 +45,8 @@ ReplayCase read_replay(const io::Table& table) {
     replay.to = inner.optional_number("to", io::positive);
     replay.at = inner.number("at", io::non_negative, 0);
     replay.of = inner.text("of", "");
-    if (replay.from && replay.to && *replay.from >= *replay.to) inner.fail("to", "must be later than `from`.");
+    if (replay.from && replay.to && *replay.from >= *replay.to)
+      inner.fail("to", "must be later than `from`.");
     inner.reject_unknown();
   }
   return replay;
@@ -48,8 +59,10 @@ ParticipantCase read_participant(const io::Table& table, bool substituted) {
   const int sorts = table.has("solver") + table.has("command") + table.has("replay");
   if (sorts == 0) {
     const auto near = io::nearest_word(table.name(), reserved);
-    table.fail(fmt::format("is not a known key, and as a participant it lacks solver = \"…\", command = […] or replay = \"…\". {}",
-                           near ? fmt::format("Did you mean {}?", *near) : "Add one."));
+    table.fail(
+        fmt::format("is not a known key, and as a participant it lacks solver = \"…\", command = "
+                    "[…] or replay = \"…\". {}",
+                    near ? fmt::format("Did you mean {}?", *near) : "Add one."));
   }
   if (sorts > 1) table.fail("has more than one of solver, command and replay. Keep one.");
   participant.advance_limit = table.optional_number("advance_limit", io::positive);
@@ -58,7 +71,8 @@ ParticipantCase read_participant(const io::Table& table, bool substituted) {
     participant.solver = table.text("solver");
   } else if (table.has("command")) {
     participant.command = table.texts("command");
-    if (participant.command.empty()) table.fail("command", "is empty. Name the program and its arguments.");
+    if (participant.command.empty())
+      table.fail("command", "is empty. Name the program and its arguments.");
   } else {
     participant.replay = read_replay(table);
     table.reject_unknown();
@@ -66,28 +80,35 @@ ParticipantCase read_participant(const io::Table& table, bool substituted) {
   return participant;
 }
 
-void read_participants(const io::Table& root, const std::optional<Substitute>& substitute, Case& read) {
+void read_participants(const io::Table& root, const std::optional<Substitute>& substitute,
+                       Case& read) {
   for (const auto& [name, table] : root.named_tables()) {
     if (std::find(reserved.begin(), reserved.end(), name) != reserved.end()) continue;
     if (name.find_first_of("./") != std::string::npos)
-      table.fail("has a dot or slash in its name, which stands between a participant and its surfaces. Rename it.");
+      table.fail(
+          "has a dot or slash in its name, which stands between a participant and its surfaces. "
+          "Rename it.");
     const bool substituted = substitute && substitute->participant == name;
     read.participants.push_back(read_participant(table, substituted));
     if (substituted) read.participants.back().replay = substitute->replay;
     root.skip(name);
   }
   if (read.participants.empty())
-    throw io::UserError(root.location(), "no participant: add a table with solver = \"dem\", solver = \"fem\" or command = […].");
+    throw io::UserError(
+        root.location(),
+        "no participant: add a table with solver = \"dem\", solver = \"fem\" or command = […].");
 }
 
 SurfaceName read_surface(const io::Table& table, std::string_view key, const Case& read) {
   const auto text = table.text(key);
   const auto dot = text.find('.');
   if (dot == std::string::npos || dot == 0 || dot + 1 == text.size())
-    table.fail(key, fmt::format("= \"{}\" is not a surface. Write participant.surface, e.g. \"{}.wall\".", text,
-                                read.participants.front().name));
+    table.fail(
+        key, fmt::format("= \"{}\" is not a surface. Write participant.surface, e.g. \"{}.wall\".",
+                         text, read.participants.front().name));
   SurfaceName name{text.substr(0, dot), text.substr(dot + 1)};
-  if (name.surface.find('/') != std::string::npos) table.fail(key, "has a slash in the surface's name. Rename the surface.");
+  if (name.surface.find('/') != std::string::npos)
+    table.fail(key, "has a slash in the surface's name. Rename the surface.");
   if (!read.find(name.participant)) {
     std::vector<std::string> known;
     for (const auto& participant : read.participants) known.push_back(participant.name);
@@ -107,60 +128,81 @@ void read_interfaces(const io::Table& coupling, Case& read) {
     interface.at = table.location();
     interface.from_at = table.location("from");
     interface.to_at = table.location("to");
-    if (table.choice("mapping", {"conservative", "overlap", "profile"}, "conservative") != "conservative")
+    if (table.choice("mapping", {"conservative", "overlap", "profile"}, "conservative") !=
+        "conservative")
       table.fail("mapping", "is not in this version yet. Use \"conservative\".");
-    if (interface.from.participant == interface.to.participant) table.fail("to", "is the participant that sends. Name another.");
+    if (interface.from.participant == interface.to.participant)
+      table.fail("to", "is the participant that sends. Name another.");
     for (const auto& other : read.interfaces)
-      if (other.from == interface.from && other.to == interface.to) table.fail("repeats an interface. Remove one of the two.");
+      if (other.from == interface.from && other.to == interface.to)
+        table.fail("repeats an interface. Remove one of the two.");
     read.interfaces.push_back(std::move(interface));
   }
   if (read.interfaces.empty())
-    coupling.fail("interface", "is missing. Add [[coupling.interface]] with from = \"participant.surface\" and to = \"participant.surface\".");
+    coupling.fail("interface",
+                  "is missing. Add [[coupling.interface]] with from = \"participant.surface\" and "
+                  "to = \"participant.surface\".");
   for (const auto& interface : read.interfaces)
     if (read.receives(interface.from.participant))
-      throw io::UserError(interface.from_at, fmt::format("{} receives forces and sends some too: that is two-way, and this version "
-                                                         "does scheme = \"one-way\". Remove one of the interfaces.",
-                                                         interface.from.participant));
+      throw io::UserError(
+          interface.from_at,
+          fmt::format("{} receives forces and sends some too: that is two-way, and this version "
+                      "does scheme = \"one-way\". Remove one of the interfaces.",
+                      interface.from.participant));
 }
 
 void read_loads(const io::Table& coupling, Case& read) {
   const auto loads = coupling.choice("loads", {"history", "mean", "snapshot"}, "history");
-  read.loads = loads == "history" ? Loads::history : loads == "mean" ? Loads::mean : Loads::snapshot;
+  read.loads = loads == "history" ? Loads::history
+               : loads == "mean"  ? Loads::mean
+                                  : Loads::snapshot;
   const auto only_for = [&](const char* key, const char* which) {
-    if (coupling.has(key)) coupling.fail(key, fmt::format("has a meaning with loads = {} only. Remove it.", which));
+    if (coupling.has(key))
+      coupling.fail(key, fmt::format("has a meaning with loads = {} only. Remove it.", which));
   };
-  if (std::all_of(read.interfaces.begin(), read.interfaces.end(), [](const auto& i) { return i.recorded_only(); }))
+  if (std::all_of(read.interfaces.begin(), read.interfaces.end(),
+                  [](const auto& i) { return i.recorded_only(); }))
     for (const char* key : {"at", "over", "loads_from"})
-      if (coupling.has(key)) coupling.fail(key, "has no effect: no interface has a receiver. Add `to` to one, or remove it.");
+      if (coupling.has(key))
+        coupling.fail(key,
+                      "has no effect: no interface has a receiver. Add `to` to one, or remove it.");
   if (read.loads == Loads::history) {
     only_for("at", "\"mean\" or \"snapshot\"");
     only_for("over", "\"mean\"");
     const double from = coupling.number("loads_from", io::non_negative, 0);
     read.loads_from = static_cast<std::int64_t>(std::ceil(from / read.window - 1e-9));
-    if (read.loads_from >= read.windows) coupling.fail("loads_from", "leaves no window to send. Choose a time before `end`.");
+    if (read.loads_from >= read.windows)
+      coupling.fail("loads_from", "leaves no window to send. Choose a time before `end`.");
     return;
   }
   only_for("loads_from", "\"history\"");
   if (read.loads == Loads::snapshot) only_for("over", "\"mean\"");
   const double at = coupling.number("at", io::positive, read.end);
-  if (at > read.end * (1 + 1e-12)) coupling.fail("at", fmt::format("= {:.10g} s is after the end, {:.10g} s.", at, read.end));
+  if (at > read.end * (1 + 1e-12))
+    coupling.fail("at", fmt::format("= {:.10g} s is after the end, {:.10g} s.", at, read.end));
   read.load_end = whole_windows(coupling, "at", at, read.window);
-  const auto over = read.loads == Loads::mean
-                        ? whole_windows(coupling, "over", coupling.number("over", io::positive, read.window), read.window)
-                        : 1;
-  if (over < 1 || over > read.load_end) coupling.fail("over", "must be at least a window and reach no further back than the start.");
+  const auto over =
+      read.loads == Loads::mean
+          ? whole_windows(coupling, "over", coupling.number("over", io::positive, read.window),
+                          read.window)
+          : 1;
+  if (over < 1 || over > read.load_end)
+    coupling.fail("over", "must be at least a window and reach no further back than the start.");
   read.load_start = read.load_end - over;
 }
 
 void read_coupling(const io::Table& root, Case& read) {
   const auto coupling = root.table("coupling");
   if (coupling.choice("scheme", {"one-way", "explicit", "parallel", "implicit"}) != "one-way")
-    coupling.fail("scheme", fmt::format("= \"{}\" is not in this version yet. Use \"one-way\".", coupling.text("scheme")));
+    coupling.fail("scheme", fmt::format("= \"{}\" is not in this version yet. Use \"one-way\".",
+                                        coupling.text("scheme")));
   if (coupling.is_text("window"))
     coupling.fail("window", "must be a number of seconds in this version, e.g. 0.05.");
   read.window = coupling.number("window", io::positive);
   read.windows = whole_windows(root, "end", read.end, read.window);
-  if (read.windows < 1) coupling.fail("window", fmt::format("= {:.10g} s is longer than the run of {:.10g} s.", read.window, read.end));
+  if (read.windows < 1)
+    coupling.fail("window", fmt::format("= {:.10g} s is longer than the run of {:.10g} s.",
+                                        read.window, read.end));
   read.max_distance = coupling.number("max_distance", io::positive);
   read.start_limit = coupling.number("start_limit", io::positive, 60);
   // About twenty pictures are enough to see a run and small beside its series.
@@ -183,16 +225,20 @@ void read_expectations(const io::Table& root, Case& read) {
     expectation.where = expect.location(key);
     const auto dot = key.find('.');
     if (dot == std::string::npos || !read.find(key.substr(0, dot)))
-      expect.fail(key, "names no quantity of a participant. Write \"participant.quantity\" in quotes, e.g. \"structure.reaction.z\".");
+      expect.fail(key,
+                  "names no quantity of a participant. Write \"participant.quantity\" in quotes, "
+                  "e.g. \"structure.reaction.z\".");
     expectation.value = table.number("value");
     if (table.has("relative") == table.has("absolute"))
       table.fail("needs a tolerance: either relative = … or absolute = … in the quantity's unit.");
     expectation.relative = table.has("relative");
-    expectation.tolerance = table.number(expectation.relative ? "relative" : "absolute", io::non_negative);
+    expectation.tolerance =
+        table.number(expectation.relative ? "relative" : "absolute", io::non_negative);
     if (expectation.relative && expectation.value == 0)
       table.fail("relative", "has no meaning for an expected value of 0. Use absolute.");
     expectation.mean_over = table.number("mean_over", io::positive, 0.0);
-    expectation.at = table.number("at", {0, read.end * (1 + 1e-12), true, false, "The run ends there."}, read.end);
+    expectation.at = table.number(
+        "at", {0, read.end * (1 + 1e-12), true, false, "The run ends there."}, read.end);
     expectation.source = table.text("source", "");
     read.expectations.push_back(std::move(expectation));
   }
@@ -208,12 +254,16 @@ void resolve(const io::Table& root, std::optional<Substitute>& substitute) {
   }
   if (substitute->participant.empty()) {
     if (senders.size() != 1)
-      throw io::UserError(root.location(), fmt::format("{} participants send forces ({}). Name the one to replay with --as.",
-                                                       senders.size(), fmt::join(senders, ", ")));
+      throw io::UserError(
+          root.location(),
+          fmt::format("{} participants send forces ({}). Name the one to replay with --as.",
+                      senders.size(), fmt::join(senders, ", ")));
     substitute->participant = senders.front();
   } else if (std::find(senders.begin(), senders.end(), substitute->participant) == senders.end()) {
-    throw io::UserError(root.location(), fmt::format("{} sends no forces, so it cannot be replayed. Those that do: {}.",
-                                                     substitute->participant, fmt::join(senders, ", ")));
+    throw io::UserError(
+        root.location(),
+        fmt::format("{} sends no forces, so it cannot be replayed. Those that do: {}.",
+                    substitute->participant, fmt::join(senders, ", ")));
   }
 }
 
@@ -232,23 +282,29 @@ const ParticipantCase* Case::find(const std::string& participant) const {
 }
 
 bool Case::sends(const std::string& participant) const {
-  return std::any_of(interfaces.begin(), interfaces.end(), [&](const auto& i) { return i.from.participant == participant; });
+  return std::any_of(interfaces.begin(), interfaces.end(),
+                     [&](const auto& i) { return i.from.participant == participant; });
 }
 
 bool Case::receives(const std::string& participant) const {
-  return std::any_of(interfaces.begin(), interfaces.end(), [&](const auto& i) { return i.to.participant == participant; });
+  return std::any_of(interfaces.begin(), interfaces.end(),
+                     [&](const auto& i) { return i.to.participant == participant; });
 }
 
 Case read_case(const io::Table& root, const std::optional<Substitute>& substitute) {
   Case read;
   read.file = root.file();
-  for (const char* key : {"title", "dimension", "gravity", "end", "coupling", "expect"}) root.has(key);
+  for (const char* key : {"title", "dimension", "gravity", "end", "coupling", "expect"})
+    root.has(key);
   root.skip("plugins");
-  for (const auto& key : root.keys()) {  // before a missing key is complained of: it may be the same one, misspelt
-    if (root.is_table(key) || std::find(reserved.begin(), reserved.end(), key) != reserved.end()) continue;
+  for (const auto& key :
+       root.keys()) {  // before a missing key is complained of: it may be the same one, misspelt
+    if (root.is_table(key) || std::find(reserved.begin(), reserved.end(), key) != reserved.end())
+      continue;
     const auto near = io::nearest_word(key, reserved);
-    root.fail(key, fmt::format("is not a known key. {}", near ? fmt::format("Did you mean {}?", *near)
-                                                              : fmt::format("Known here: {}.", fmt::join(reserved, ", "))));
+    root.fail(key, fmt::format("is not a known key. {}",
+                               near ? fmt::format("Did you mean {}?", *near)
+                                    : fmt::format("Known here: {}.", fmt::join(reserved, ", "))));
   }
   auto named = substitute;
   if (named) resolve(root, named);

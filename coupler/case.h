@@ -1,4 +1,5 @@
-// What the coupler reads of a case: who takes part, which surfaces meet, over which windows, and what is expected.
+// What the coupler reads of a case: who takes part, which surfaces meet, over which windows, and
+// what is expected.
 #pragma once
 
 #include <cstdint>
@@ -18,18 +19,21 @@ struct SurfaceName {
   bool operator==(const SurfaceName&) const = default;
 };
 
-/// [[coupling.interface]]: forces go from one surface to another, or, without `to`, into the record alone.
+/// [[coupling.interface]]: forces go from one surface to another, or, without `to`, into the record
+/// alone.
 struct InterfaceCase {
   SurfaceName from, to;
   io::Location at, from_at, to_at;
   bool recorded_only() const { return to.participant.empty(); }
-  std::string text() const { return recorded_only() ? from.text() + " (recorded)" : from.text() + " to " + to.text(); }
+  std::string text() const {
+    return recorded_only() ? from.text() + " (recorded)" : from.text() + " to " + to.text();
+  }
 };
 
 /// A recorded participant plays instead of a live one.
 struct ReplayCase {
-  std::string file;                ///< an interface.h5; absolute, or as given on a command line
-  std::string of;                  ///< its name in the record; empty: its own, or the only one recorded
+  std::string file;  ///< an interface.h5; absolute, or as given on a command line
+  std::string of;    ///< its name in the record; empty: its own, or the only one recorded
   std::optional<double> from, to;  ///< part of the record that is played [s]; default all of it
   double at = 0;                   ///< time of this run at which `from` is played [s]
 };
@@ -71,18 +75,20 @@ struct Case {
   double end = 0, window = 0;  ///< [s]
   std::int64_t windows = 0;
   Loads loads = Loads::history;
-  std::int64_t loads_from = 0;      ///< first window that receivers are given (history)
-  std::int64_t load_start = 0;      ///< windows [load_start, load_end) of a mean or snapshot
+  std::int64_t loads_from = 0;  ///< first window that receivers are given (history)
+  std::int64_t load_start = 0;  ///< windows [load_start, load_end) of a mean or snapshot
   std::int64_t load_end = 0;
-  double max_distance = 0;          ///< [m]
-  double start_limit = 60;          ///< [s]
-  std::int64_t output_every = 1;    ///< windows between pictures
+  double max_distance = 0;        ///< [m]
+  double start_limit = 60;        ///< [s]
+  std::int64_t output_every = 1;  ///< windows between pictures
   LedgerLimits limits;
   std::vector<InterfaceCase> interfaces;
   std::vector<ParticipantCase> participants;
   std::vector<Expectation> expectations;
 
-  double time(std::int64_t windows_done) const { return static_cast<double>(windows_done) * window; }
+  double time(std::int64_t windows_done) const {
+    return static_cast<double>(windows_done) * window;
+  }
   const ParticipantCase* find(const std::string& participant) const;
   bool sends(const std::string& participant) const;
   bool receives(const std::string& participant) const;
@@ -94,7 +100,8 @@ struct Substitute {
   ReplayCase replay;
 };
 
-/// Reads everything but the participants' own keys, which their solvers check. @throws io::UserError, located
+/// Reads everything but the participants' own keys, which their solvers check. @throws
+/// io::UserError, located
 Case read_case(const io::Table& root, const std::optional<Substitute>& substitute = {});
 
 }  // namespace acopla::coupler

@@ -22,12 +22,13 @@ struct Stages {
   std::optional<OneWay> scheme;
 };
 
-void compute(const Case& read, Crew& crew, const std::string& results, Reporter& reporter, Stages& stages,
-             std::chrono::steady_clock::time_point begin) {
+void compute(const Case& read, Crew& crew, const std::string& results, Reporter& reporter,
+             Stages& stages, std::chrono::steady_clock::time_point begin) {
   crew.assemble();
   stages.record.emplace(read, results);
   stages.scheme.emplace(read, crew, *stages.record, stages.quantities, reporter);
-  reporter.assembled(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  reporter.assembled(
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   stages.scheme->run();
   for (const auto& [name, value] : crew.finish()) stages.quantities.add(name, read.end, value);
 }
@@ -45,16 +46,18 @@ int exit_code_of(Failure::Cause cause) {
 }
 
 // Runs the stages and turns whatever ends them early into words.
-void attempt(const Case& read, Crew& crew, const std::string& results, Reporter& reporter, Stages& stages,
-             std::chrono::steady_clock::time_point begin, Outcome& outcome) {
+void attempt(const Case& read, Crew& crew, const std::string& results, Reporter& reporter,
+             Stages& stages, std::chrono::steady_clock::time_point begin, Outcome& outcome) {
   try {
     compute(read, crew, results, reporter, stages, begin);
     outcome.status = Status::met;
     outcome.exit_code = io::exit_done;
   } catch (const Interrupted& interrupted) {
-    note_error(outcome, Status::interrupted, io::exit_interrupted, {"coupler", "running", interrupted.what()});
+    note_error(outcome, Status::interrupted, io::exit_interrupted,
+               {"coupler", "running", interrupted.what()});
   } catch (const Failure& failure) {
-    note_error(outcome, Status::failed, exit_code_of(failure.cause()), {failure.participant(), failure.state(), failure.what()});
+    note_error(outcome, Status::failed, exit_code_of(failure.cause()),
+               {failure.participant(), failure.state(), failure.what()});
   } catch (const io::UserError& error) {
     note_error(outcome, Status::failed, io::exit_user_error, {"coupler", "starting", error.what()});
   } catch (const std::exception& error) {
@@ -75,7 +78,8 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
     outcome.ledgers = stages.scheme->ledgers();
     outcome.interfaces = stages.scheme->interfaces();
   }
-  for (const auto& expectation : read.expectations) outcome.expectations.push_back(stages.quantities.check(expectation));
+  for (const auto& expectation : read.expectations)
+    outcome.expectations.push_back(stages.quantities.check(expectation));
   if (outcome.status != Status::met) return;
   for (const auto& checked : outcome.expectations)
     if (!checked.met) {
@@ -96,7 +100,8 @@ Outcome Coupler::run() {
     gather(case_, crew, stages, outcome);
   }  // the series are closed before the summary says that they are there
   outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (!options_.results.empty()) io::write_whole(options_.results + "/summary.json", summary_text(outcome));
+  if (!options_.results.empty())
+    io::write_whole(options_.results + "/summary.json", summary_text(outcome));
   reporter_.done(outcome);
   return outcome;
 }

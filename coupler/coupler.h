@@ -22,8 +22,9 @@ class Coupler {
   Coupler(zmq::context_t& context, const Case& read, Options options, Reporter& reporter)
       : context_(context), case_(read), options_(std::move(options)), reporter_(reporter) {}
 
-  /// Runs the case. Whatever happens to a participant is in the outcome, and in summary.json; the series are closed and
-  /// readable. @throws io::UserError when it cannot even begin: the address is taken, the results cannot be written
+  /// Runs the case. Whatever happens to a participant is in the outcome, and in summary.json; the
+  /// series are closed and readable. @throws io::UserError when it cannot even begin: the address
+  /// is taken, the results cannot be written
   Outcome run();
 
  private:

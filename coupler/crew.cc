@@ -24,11 +24,13 @@ std::string pulse_endpoint(const std::string& hub) {
   return hub.starts_with("tcp://") ? hub.substr(0, hub.rfind(':')) + ":*" : hub + ".pulse";
 }
 
-double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {
+double seconds_between(std::chrono::steady_clock::time_point from,
+                       std::chrono::steady_clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-// What a stranger sent goes to a terminal and a log: nothing but printable characters, and not too many.
+// What a stranger sent goes to a terminal and a log: nothing but printable characters, and not too
+// many.
 std::string printable(std::string text) {
   for (auto& c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
@@ -37,17 +39,23 @@ std::string printable(std::string text) {
 
 }  // namespace
 
-Crew::Crew(zmq::context_t& context, const std::string& endpoint, const Case& read, const std::string& results,
-           Reporter& reporter, Outside* outside)
-    : case_(read), results_(results), reporter_(reporter), outside_(outside), hub_(context, endpoint),
-      pulse_(context, pulse_endpoint(hub_.endpoint())), begin_(Clock::now()) {
+Crew::Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
+           const std::string& results, Reporter& reporter, Outside* outside)
+    : case_(read),
+      results_(results),
+      reporter_(reporter),
+      outside_(outside),
+      hub_(context, endpoint),
+      pulse_(context, pulse_endpoint(hub_.endpoint())),
+      begin_(Clock::now()) {
   for (const auto& participant : case_.participants) {
     auto& member = members_[participant.name];
     member.about = &participant;
     member.since = begin_;
     member.outcome.name = participant.name;
     member.outcome.solver = participant.replay ? "replay" : participant.solver;
-    if (participant.replay) member.replay = std::make_unique<Replay>(*participant.replay, participant.name);
+    if (participant.replay)
+      member.replay = std::make_unique<Replay>(*participant.replay, participant.name);
   }
   reporter_.ready(hub_.endpoint());
 }
@@ -58,24 +66,28 @@ void Crew::assemble() {
   while (!all_are(Member::Phase::idle)) turn(tick);
 }
 
-const geometry::SurfaceMesh& Crew::surface(const SurfaceName& name, const io::Location& asked_at) const {
+const geometry::SurfaceMesh& Crew::surface(const SurfaceName& name,
+                                           const io::Location& asked_at) const {
   const auto& surfaces = members_.at(name.participant).surfaces;
   const auto found = surfaces.find(name.surface);
   if (found != surfaces.end()) return found->second;
   std::vector<std::string> known;
   for (const auto& [surface, mesh] : surfaces) known.push_back(surface);
   const auto near = io::nearest_word(name.surface, known);
-  throw io::UserError(asked_at, fmt::format("{} has no surface \"{}\". {}", name.participant, name.surface,
-                                            near            ? fmt::format("Did you mean \"{}.{}\"?", name.participant, *near)
-                                            : known.empty() ? std::string("It offers none.")
-                                                            : fmt::format("It offers: {}.", fmt::join(known, ", "))));
+  throw io::UserError(
+      asked_at,
+      fmt::format("{} has no surface \"{}\". {}", name.participant, name.surface,
+                  near            ? fmt::format("Did you mean \"{}.{}\"?", name.participant, *near)
+                  : known.empty() ? std::string("It offers none.")
+                                  : fmt::format("It offers: {}.", fmt::join(known, ", "))));
 }
 
 void Crew::begin_advance(const std::string& participant, std::int64_t start, std::int64_t end,
                          std::vector<protocol::Field> fields) {
   auto& member = members_.at(participant);
   const protocol::Window window{start, end, case_.time(start), case_.time(end) - case_.time(start)};
-  enter(member, Member::Phase::advancing, fmt::format("advancing from {:.6g} s to {:.6g} s", window.start_time, window.end_time()));
+  enter(member, Member::Phase::advancing,
+        fmt::format("advancing from {:.6g} s to {:.6g} s", window.start_time, window.end_time()));
   if (member.replay) {
     take_advance(member, member.replay->advance(window, fields));
     return;
@@ -114,15 +126,18 @@ void Crew::dismiss(const std::string& why) noexcept {
 
 std::vector<ParticipantOutcome> Crew::outcomes() const {
   std::vector<ParticipantOutcome> all;
-  for (const auto& participant : case_.participants) all.push_back(members_.at(participant.name).outcome);
+  for (const auto& participant : case_.participants)
+    all.push_back(members_.at(participant.name).outcome);
   return all;
 }
 
-// One turn of the loop: waits for whatever comes first, hears all that is there, and looks after everybody.
+// One turn of the loop: waits for whatever comes first, hears all that is there, and looks after
+// everybody.
 void Crew::turn(std::chrono::milliseconds wait) {
   std::vector<zmq::pollitem_t> items{{hub_.socket().handle(), 0, ZMQ_POLLIN, 0}};
   if (outside_)
-    for (const int descriptor : outside_->descriptors()) items.push_back({nullptr, descriptor, ZMQ_POLLIN, 0});
+    for (const int descriptor : outside_->descriptors())
+      items.push_back({nullptr, descriptor, ZMQ_POLLIN, 0});
   try {
     zmq::poll(items.data(), items.size(), wait);
   } catch (const zmq::error_t& error) {
@@ -158,16 +173,19 @@ void Crew::hear_member(Member& member, const Message& message) {
   if (message.kind == Kind::error) {
     const auto error = protocol::read_error(message);
     if (!error.state.empty()) member.state = error.state;
-    if (error.mistake) throw Failure(member.about->name, member.state, error.text, Failure::Cause::mistake);
+    if (error.mistake)
+      throw Failure(member.about->name, member.state, error.text, Failure::Cause::mistake);
     throw Failure(member.about->name, member.state,
-                  fmt::format("{} ({}) failed while {}: {}", member.about->name, member.about->program(), member.state, error.text));
+                  fmt::format("{} ({}) failed while {}: {}", member.about->name,
+                              member.about->program(), member.state, error.text));
   }
   const bool in_turn = (member.phase == Phase::starting && message.kind == Kind::interface) ||
                        (member.phase == Phase::advancing && message.kind == Kind::advanced) ||
                        (member.phase == Phase::finishing && message.kind == Kind::done);
   if (!in_turn) fail(member, fmt::format("sent {} out of turn", protocol::name_of(message.kind)));
   if (member.phase != Phase::starting && message.sequence != member.sequence)
-    fail(member, fmt::format("answered request {} while {} was asked", message.sequence, member.sequence));
+    fail(member,
+         fmt::format("answered request {} while {} was asked", message.sequence, member.sequence));
   if (message.kind == Kind::interface) take_surfaces(member, protocol::read_interface(message));
   if (message.kind == Kind::advanced) take_advance(member, protocol::read_advanced(message));
   if (message.kind == Kind::done) take_end(member, message);
@@ -183,7 +201,8 @@ void Crew::hear_stranger(const protocol::Arrival& arrival) {
       refuse(arrival.peer, error.what());
     }
   } else if (arrival.message->kind != Kind::error) {  // an error is never answered by an error
-    refuse(arrival.peer, fmt::format("{} came before hello", protocol::name_of(arrival.message->kind)));
+    refuse(arrival.peer,
+           fmt::format("{} came before hello", protocol::name_of(arrival.message->kind)));
   }
 }
 
@@ -194,20 +213,23 @@ void Crew::admit(const std::string& peer, const Message& message) {
     std::vector<std::string> names;
     for (const auto& [name, member] : members_)
       if (!member.replay) names.push_back(name);
-    return refuse(peer, fmt::format("there is no participant \"{}\" here; there are: {}", printable(hello.participant),
-                                    fmt::join(names, ", ")));
+    return refuse(peer, fmt::format("there is no participant \"{}\" here; there are: {}",
+                                    printable(hello.participant), fmt::join(names, ", ")));
   }
   auto& member = found->second;
   if (member.phase != Member::Phase::absent)
-    return refuse(peer, fmt::format("{} is connected already; end this process or the other", hello.participant));
+    return refuse(peer, fmt::format("{} is connected already; end this process or the other",
+                                    hello.participant));
   if (hello.version_low > protocol::version || hello.version_high < protocol::version) {
-    const auto why = fmt::format("speaks protocol versions {} to {}, this coupler speaks {}. Use programs of one release",
-                                 hello.version_low, hello.version_high, protocol::version);
+    const auto why = fmt::format(
+        "speaks protocol versions {} to {}, this coupler speaks {}. Use programs of one release",
+        hello.version_low, hello.version_high, protocol::version);
     refuse(peer, why);
     fail(member, why);
   }
   if (hello.introduction.dimension != case_.dimension) {
-    const auto why = fmt::format("works in {} dimensions, the case has {}", hello.introduction.dimension, case_.dimension);
+    const auto why = fmt::format("works in {} dimensions, the case has {}",
+                                 hello.introduction.dimension, case_.dimension);
     refuse(peer, why);
     fail(member, why);
   }
@@ -229,7 +251,8 @@ void Crew::refuse(const std::string& peer, const std::string& why) {
 
 void Crew::take_surfaces(Member& member, std::vector<protocol::Surface> surfaces) {
   for (auto& surface : surfaces) {
-    if (surface.name.find('/') != std::string::npos) fail(member, fmt::format("offers a surface with a slash in its name, \"{}\"", surface.name));
+    if (surface.name.find('/') != std::string::npos)
+      fail(member, fmt::format("offers a surface with a slash in its name, \"{}\"", surface.name));
     if (!member.surfaces.emplace(surface.name, std::move(surface.mesh)).second)
       fail(member, fmt::format("offers the surface {} twice", surface.name));
   }
@@ -240,17 +263,22 @@ void Crew::take_surfaces(Member& member, std::vector<protocol::Surface> surfaces
 void Crew::take_advance(Member& member, protocol::Advance advance) {
   for (const auto& field : advance.fields) {
     const auto surface = member.surfaces.find(field.surface);
-    if (surface == member.surfaces.end()) fail(member, fmt::format("sent {} on {}, a surface it never offered", field.name, field.surface));
+    if (surface == member.surfaces.end())
+      fail(member,
+           fmt::format("sent {} on {}, a surface it never offered", field.name, field.surface));
     if (field.values.size() != surface->second.points.size())
-      fail(member, fmt::format("sent {} on {} with {} values for {} points", field.name, field.surface, field.values.size(),
-                               surface->second.points.size()));
+      fail(member, fmt::format("sent {} on {} with {} values for {} points", field.name,
+                               field.surface, field.values.size(), surface->second.points.size()));
     for (std::size_t k = 0; k < field.values.size(); ++k)
-      if (!field.values[k].allFinite()) fail(member, fmt::format("sent {} on {} that is not finite at point {}", field.name, field.surface, k));
+      if (!field.values[k].allFinite())
+        fail(member, fmt::format("sent {} on {} that is not finite at point {}", field.name,
+                                 field.surface, k));
   }
   for (const auto& use : run_for(*member.about).uses)
     for (const auto& wanted : use.sends)
-      if (std::none_of(advance.fields.begin(), advance.fields.end(),
-                       [&](const auto& field) { return field.surface == use.surface && field.name == wanted; }))
+      if (std::none_of(advance.fields.begin(), advance.fields.end(), [&](const auto& field) {
+            return field.surface == use.surface && field.name == wanted;
+          }))
         fail(member, fmt::format("did not send {} on {}", wanted, use.surface));
   member.outcome.steps += advance.steps;
   enter(member, Member::Phase::idle, "waiting for the others");
@@ -280,7 +308,8 @@ void Crew::heed(const Notice& notice) {
   fail(member, notice.how);
 }
 
-// A participant that ended may have said why; what it said is better than what became of its process.
+// A participant that ended may have said why; what it said is better than what became of its
+// process.
 void Crew::hear_last_words(const std::string& peer) {
   if (peer.empty()) return;
   const auto until = Clock::now() + last_words_wait;
@@ -300,10 +329,15 @@ void Crew::check_health() {
   for (const auto& [name, member] : members_) {
     using Phase = Member::Phase;
     if (member.phase == Phase::absent && seconds_between(begin_, now) > case_.start_limit)
-      fail(member, fmt::format("did not say hello within {:.6g} s (coupling.start_limit). Start it, or look at its log", case_.start_limit));
-    const bool busy = member.phase == Phase::starting || member.phase == Phase::advancing || member.phase == Phase::finishing;
-    if (busy && member.about->advance_limit && seconds_between(member.since, now) > *member.about->advance_limit)
-      fail(member, fmt::format("lives but made no progress for {:.6g} s (its advance_limit)", *member.about->advance_limit));
+      fail(member, fmt::format("did not say hello within {:.6g} s (coupling.start_limit). Start "
+                               "it, or look at its log",
+                               case_.start_limit));
+    const bool busy = member.phase == Phase::starting || member.phase == Phase::advancing ||
+                      member.phase == Phase::finishing;
+    if (busy && member.about->advance_limit &&
+        seconds_between(member.since, now) > *member.about->advance_limit)
+      fail(member, fmt::format("lives but made no progress for {:.6g} s (its advance_limit)",
+                               *member.about->advance_limit));
   }
 }
 
@@ -313,7 +347,8 @@ void Crew::enter(Member& member, Member::Phase phase, const std::string& state) 
   const auto now = Clock::now();
   const double spent = seconds_between(member.since, now);
   if (member.phase == Phase::idle) member.outcome.seconds_waiting += spent;
-  if (member.phase == Phase::starting || member.phase == Phase::advancing || member.phase == Phase::finishing)
+  if (member.phase == Phase::starting || member.phase == Phase::advancing ||
+      member.phase == Phase::finishing)
     member.outcome.seconds += spent;
   member.phase = phase;
   member.state = state;
@@ -347,8 +382,10 @@ protocol::Run Crew::run_for(const ParticipantCase& participant) const {
     return run.uses.back();
   };
   for (const auto& interface : case_.interfaces) {
-    if (interface.from.participant == participant.name) use(interface.from.surface).sends = {"force"};
-    if (interface.to.participant == participant.name) use(interface.to.surface).receives = {"force"};
+    if (interface.from.participant == participant.name)
+      use(interface.from.surface).sends = {"force"};
+    if (interface.to.participant == participant.name)
+      use(interface.to.surface).receives = {"force"};
   }
   return run;
 }
@@ -360,12 +397,14 @@ Crew::Member* Crew::with_peer(const std::string& peer) {
 }
 
 bool Crew::all_are(Member::Phase phase) const {
-  return std::all_of(members_.begin(), members_.end(), [&](const auto& entry) { return entry.second.phase == phase; });
+  return std::all_of(members_.begin(), members_.end(),
+                     [&](const auto& entry) { return entry.second.phase == phase; });
 }
 
 void Crew::fail(const Member& member, const std::string& message) const {
   throw Failure(member.about->name, member.state,
-                fmt::format("{} ({}) {} while {}.", member.about->name, member.about->program(), message, member.state));
+                fmt::format("{} ({}) {} while {}.", member.about->name, member.about->program(),
+                            message, member.state));
 }
 
 }  // namespace acopla::coupler

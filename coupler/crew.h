@@ -1,4 +1,5 @@
-// The participants as the coupler sees them: who is there, what each is doing, and whether it still lives.
+// The participants as the coupler sees them: who is there, what each is doing, and whether it still
+// lives.
 #pragma once
 
 #include <chrono>
@@ -21,17 +22,20 @@
 
 namespace acopla::coupler {
 
-/// The coupler's half of the state machine (docs/protocol.md, §3). Whatever a participant does wrong, and whatever
-/// befalls it, ends in a Failure that names it and its state; whatever a stranger does is answered and noted.
+/// The coupler's half of the state machine (docs/protocol.md, §3). Whatever a participant does
+/// wrong, and whatever befalls it, ends in a Failure that names it and its state; whatever a
+/// stranger does is answered and noted.
 class Crew {
  public:
-  /// Binds the hub and the pulse. @param outside may be null. @throws io::UserError when the address is taken
-  Crew(zmq::context_t& context, const std::string& endpoint, const Case& read, const std::string& results,
-       Reporter& reporter, Outside* outside);
+  /// Binds the hub and the pulse. @param outside may be null. @throws io::UserError when the
+  /// address is taken
+  Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
+       const std::string& results, Reporter& reporter, Outside* outside);
 
   /// Waits until everybody said hello and sent its surfaces. @throws Failure, Interrupted
   void assemble();
-  /// A surface of a participant, once assembled. @throws io::UserError located at `asked_at` when it has none such
+  /// A surface of a participant, once assembled. @throws io::UserError located at `asked_at` when
+  /// it has none such
   const geometry::SurfaceMesh& surface(const SurfaceName& name, const io::Location& asked_at) const;
 
   /// Asks a participant, which must be idle, for the windows [start, end).
@@ -58,7 +62,14 @@ class Crew {
     const ParticipantCase* about = nullptr;
     std::unique_ptr<Replay> replay;  // plays here instead of a process
     std::string peer;                // address, once it said hello
-    enum class Phase { absent, starting, idle, advancing, finishing, finished } phase = Phase::absent;
+    enum class Phase {
+      absent,
+      starting,
+      idle,
+      advancing,
+      finishing,
+      finished
+    } phase = Phase::absent;
     std::string state = "not connected";
     std::uint64_t sequence = 0;
     std::map<std::string, geometry::SurfaceMesh> surfaces;

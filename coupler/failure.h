@@ -11,10 +11,16 @@ class Failure : public std::runtime_error {
  public:
   enum class Cause { fault, mistake, limit };  ///< exit codes 1, 2 and 3
 
-  Failure(std::string participant, std::string state, const std::string& message, Cause cause = Cause::fault)
-      : std::runtime_error(message), participant_(std::move(participant)), state_(std::move(state)), cause_(cause) {}
+  Failure(std::string participant, std::string state, const std::string& message,
+          Cause cause = Cause::fault)
+      : std::runtime_error(message),
+        participant_(std::move(participant)),
+        state_(std::move(state)),
+        cause_(cause) {}
   const std::string& participant() const { return participant_; }
-  const std::string& state() const { return state_; }  ///< what it was doing, e.g. "advancing from 0.1 s to 0.2 s"
+  const std::string& state() const {
+    return state_;
+  }  ///< what it was doing, e.g. "advancing from 0.1 s to 0.2 s"
   Cause cause() const { return cause_; }
 
  private:

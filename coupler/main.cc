@@ -24,7 +24,8 @@ struct Arguments {
 std::optional<Substitute> substitute(const Arguments& arguments) {
   if (arguments.record.empty()) return std::nullopt;
   return Substitute{arguments.replay_as,
-                    {arguments.record, arguments.replay_of, arguments.replay_from, arguments.replay_to, arguments.replay_at}};
+                    {arguments.record, arguments.replay_of, arguments.replay_from,
+                     arguments.replay_to, arguments.replay_at}};
 }
 
 // Records are read before anybody is started; the other participants check their own tables.
@@ -44,25 +45,34 @@ int run(const Arguments& arguments) {
   const auto read = read_case(io::Table::from_file(arguments.case_file), substitute(arguments));
   if (arguments.check) return check(read);
   // The launcher has made the folder already, for everybody's logs.
-  const auto results = arguments.supervised ? arguments.results : io::make_results_folder(arguments.case_file, arguments.results);
+  const auto results = arguments.supervised
+                           ? arguments.results
+                           : io::make_results_folder(arguments.case_file, arguments.results);
   zmq::context_t context;
-  const auto outcome = Coupler(context, read, {arguments.endpoint, results, &outside}, *reporter).run();
+  const auto outcome =
+      Coupler(context, read, {arguments.endpoint, results, &outside}, *reporter).run();
   if (!arguments.supervised) fmt::print("results in {}\n", results);
   return outcome.exit_code;
 }
 
 void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("case", arguments.case_file, "the case file, e.g. case.toml")->required();
-  app.add_option("--bind", arguments.endpoint, "address for the participants, ipc:///PATH or tcp://127.0.0.1:PORT");
+  app.add_option("--bind", arguments.endpoint,
+                 "address for the participants, ipc:///PATH or tcp://127.0.0.1:PORT");
   app.add_option("--results", arguments.results, "folder for the results (must not exist)");
-  app.add_option("--replay", arguments.record, "a record that plays the part of a participant that sends");
-  app.add_option("--replay-as", arguments.replay_as, "which participant it stands for (default: the only one that sends)");
-  app.add_option("--replay-of", arguments.replay_of, "whose surfaces of the record (default: the same name)");
+  app.add_option("--replay", arguments.record,
+                 "a record that plays the part of a participant that sends");
+  app.add_option("--replay-as", arguments.replay_as,
+                 "which participant it stands for (default: the only one that sends)");
+  app.add_option("--replay-of", arguments.replay_of,
+                 "whose surfaces of the record (default: the same name)");
   app.add_option("--replay-from", arguments.replay_from, "start of the part that is played [s]");
   app.add_option("--replay-to", arguments.replay_to, "its end [s]");
   app.add_option("--replay-at", arguments.replay_at, "time of this run at which it starts [s]");
-  app.add_flag("--supervised", arguments.supervised, "speak JSON with a launcher over the standard streams");
-  app.add_flag("--check", arguments.check, "check the case but for the participants' own tables, and end");
+  app.add_flag("--supervised", arguments.supervised,
+               "speak JSON with a launcher over the standard streams");
+  app.add_flag("--check", arguments.check,
+               "check the case but for the participants' own tables, and end");
 }
 
 int main_program(int argc, char** argv) {

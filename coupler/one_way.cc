@@ -14,7 +14,8 @@ using geometry::Vec3;
 
 namespace {
 
-// Windows a sender may be ahead: one under way on either side keeps both busy, and no more need be kept in memory.
+// Windows a sender may be ahead: one under way on either side keeps both busy, and no more need be
+// kept in memory.
 constexpr std::int64_t lead = 2;
 
 const std::vector<Vec3>& force_on(const protocol::Advance& advance, const std::string& surface) {
@@ -25,7 +26,8 @@ const std::vector<Vec3>& force_on(const protocol::Advance& advance, const std::s
 
 }  // namespace
 
-OneWay::OneWay(const Case& read, Crew& crew, Record& record, Quantities& quantities, Reporter& reporter)
+OneWay::OneWay(const Case& read, Crew& crew, Record& record, Quantities& quantities,
+               Reporter& reporter)
     : case_(read), crew_(crew), record_(record), quantities_(quantities), reporter_(reporter) {
   for (const auto& participant : case_.participants) {
     if (case_.receives(participant.name))
@@ -47,18 +49,22 @@ void OneWay::build(const InterfaceCase& interface) {
   }
   link.to = &crew_.surface(interface.to, interface.to_at);
   if (link.to->face_count() == 0)
-    throw io::UserError(interface.to_at, fmt::format("surface {} has no faces to receive forces.", interface.to.text()));
-  link.mapping = std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance});
+    throw io::UserError(interface.to_at, fmt::format("surface {} has no faces to receive forces.",
+                                                     interface.to.text()));
+  link.mapping =
+      std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance});
   const auto& mapping = *link.mapping;
   if (static_cast<std::int64_t>(mapping.unmapped()) > case_.limits.unmapped) {
     const auto& point = link.from->points[mapping.unmapped_points().front()];
     throw io::UserError(
         interface.at,
-        fmt::format("{} of {} points of {} are farther than max_distance = {:.6g} m from {}, e.g. ({:.6g}, {:.6g}, {:.6g}). "
-                    "Check that the surfaces stand in the same place and unit, raise coupling.max_distance, or allow that "
+        fmt::format("{} of {} points of {} are farther than max_distance = {:.6g} m from {}, e.g. "
+                    "({:.6g}, {:.6g}, {:.6g}). "
+                    "Check that the surfaces stand in the same place and unit, raise "
+                    "coupling.max_distance, or allow that "
                     "many in coupling.limits.unmapped.",
-                    mapping.unmapped(), link.from->points.size(), interface.from.text(), case_.max_distance,
-                    interface.to.text(), point[0], point[1], point[2]));
+                    mapping.unmapped(), link.from->points.size(), interface.from.text(),
+                    case_.max_distance, interface.to.text(), point[0], point[1], point[2]));
   }
   ledgers_.unmapped += static_cast<std::int64_t>(mapping.unmapped());
   ledgers_.worst_distance = std::max(ledgers_.worst_distance, mapping.worst_distance());
@@ -78,7 +84,9 @@ void OneWay::run() {
   }
 }
 
-std::int64_t OneWay::span_count() const { return case_.loads == Loads::history ? case_.windows - case_.loads_from : 1; }
+std::int64_t OneWay::span_count() const {
+  return case_.loads == Loads::history ? case_.windows - case_.loads_from : 1;
+}
 
 std::pair<std::int64_t, std::int64_t> OneWay::span(std::int64_t index) const {
   if (case_.loads != Loads::history) return {case_.load_start, case_.load_end};
@@ -86,7 +94,8 @@ std::pair<std::int64_t, std::int64_t> OneWay::span(std::int64_t index) const {
 }
 
 std::int64_t OneWay::span_of(std::int64_t window) const {
-  if (case_.loads == Loads::history) return window >= case_.loads_from ? window - case_.loads_from : -1;
+  if (case_.loads == Loads::history)
+    return window >= case_.loads_from ? window - case_.loads_from : -1;
   return window >= case_.load_start && window < case_.load_end ? 0 : -1;
 }
 
@@ -101,7 +110,8 @@ void OneWay::begin_what_can_begin() {
 }
 
 void OneWay::begin_receiver(const std::string& name, Receiver& receiver) {
-  if (receiver.next != receiver.answered || receiver.next >= span_count()) return;  // busy, or through
+  if (receiver.next != receiver.answered || receiver.next >= span_count())
+    return;  // busy, or through
   const auto [start, end] = span(receiver.next);
   for (const auto& [sender, answered] : senders_)
     if (answered < end) return;
@@ -134,7 +144,8 @@ void OneWay::note_quantities(const Crew::Answer& answer, std::int64_t window) {
     open_[window].quantities.emplace_back(answer.participant + "." + name, value);
 }
 
-void OneWay::map_forces(const std::string& sender, std::int64_t window, const protocol::Advance& advance) {
+void OneWay::map_forces(const std::string& sender, std::int64_t window,
+                        const protocol::Advance& advance) {
   auto& record = open_[window];
   record.ledger.resize(links_.size());
   for (std::size_t k = 0; k < links_.size(); ++k) {
@@ -158,7 +169,8 @@ void OneWay::map_forces(const std::string& sender, std::int64_t window, const pr
 }
 
 // Several interfaces may end on one surface, and a load may be the mean of several windows.
-void OneWay::add_to_load(const Interface& link, std::int64_t window, const std::vector<Vec3>& forces) {
+void OneWay::add_to_load(const Interface& link, std::int64_t window,
+                         const std::vector<Vec3>& forces) {
   const auto index = span_of(window);
   if (index < 0) return;
   const auto [start, end] = span(index);
@@ -195,11 +207,13 @@ void OneWay::close_window() {
     ledgers_.moment_loss = std::max(ledgers_.moment_loss, row.loss.moment);
   }
   ++complete_;
-  const auto seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  const auto seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   reporter_.progress(complete_, case_.windows, end, seconds);
   check_limits(window);
   open_.erase(complete_ - 1);
-  if (const auto index = span_of(complete_ - 1); index >= 0 && span(index).second == complete_) loads_.erase(index);
+  if (const auto index = span_of(complete_ - 1); index >= 0 && span(index).second == complete_)
+    loads_.erase(index);
 }
 
 // Losses are compared so that NaN, which no comparison holds for, is beyond every limit.
@@ -207,12 +221,16 @@ void OneWay::check_limits(const WindowRecord& window) const {
   for (std::size_t k = 0; k < links_.size(); ++k) {
     const auto check = [&](const char* what, double value, double limit) {
       if (value <= limit) return;
-      const auto state = fmt::format("mapping the window that ends at {:.6g} s", case_.time(complete_));
-      throw Failure(case_.interfaces[k].text(), state,
-                    fmt::format("{}: the mapping from {} lost {:.3g} of the {} in the window that ends at {:.6g} s; "
-                                "coupling.limits.{}_loss = {:.3g}.",
-                                case_.interfaces[k].at.text(), case_.interfaces[k].text(), value, what, case_.time(complete_), what, limit),
-                    Failure::Cause::limit);
+      const auto state =
+          fmt::format("mapping the window that ends at {:.6g} s", case_.time(complete_));
+      throw Failure(
+          case_.interfaces[k].text(), state,
+          fmt::format(
+              "{}: the mapping from {} lost {:.3g} of the {} in the window that ends at {:.6g} s; "
+              "coupling.limits.{}_loss = {:.3g}.",
+              case_.interfaces[k].at.text(), case_.interfaces[k].text(), value, what,
+              case_.time(complete_), what, limit),
+          Failure::Cause::limit);
     };
     check("force", window.ledger[k].loss.force, case_.limits.force_loss);
     check("moment", window.ledger[k].loss.moment, case_.limits.moment_loss);

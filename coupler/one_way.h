@@ -17,14 +17,16 @@
 
 namespace acopla::coupler {
 
-/// Runs all windows. Senders compute one window ahead of the slowest receiver, so that both sides work at the same time;
-/// each window is recorded, in order, once everybody is through it.
+/// Runs all windows. Senders compute one window ahead of the slowest receiver, so that both sides
+/// work at the same time; each window is recorded, in order, once everybody is through it.
 ///
-/// What receivers get: `history` every window from loads_from on, with the mean force of that window; `mean` one window
-/// [at − over, at] with the mean over it; `snapshot` the last window before `at` alone.
+/// What receivers get: `history` every window from loads_from on, with the mean force of that
+/// window; `mean` one window [at − over, at] with the mean over it; `snapshot` the last window
+/// before `at` alone.
 class OneWay {
  public:
-  /// Builds the mappings. @throws io::UserError located at the interface whose surfaces do not exist or do not meet
+  /// Builds the mappings. @throws io::UserError located at the interface whose surfaces do not
+  /// exist or do not meet
   OneWay(const Case& read, Crew& crew, Record& record, Quantities& quantities, Reporter& reporter);
 
   /// @throws Failure, also for a ledger beyond its limit; Interrupted
@@ -41,7 +43,7 @@ class OneWay {
     std::unique_ptr<Mapping> mapping;
   };
   struct Receiver {
-    std::int64_t next = 0;    // span to be begun
+    std::int64_t next = 0;  // span to be begun
     std::int64_t answered = 0;
   };
 
@@ -50,15 +52,17 @@ class OneWay {
   void begin_receiver(const std::string& name, Receiver& receiver);
   void take(Crew::Answer answer);
   void map_forces(const std::string& sender, std::int64_t window, const protocol::Advance& advance);
-  void add_to_load(const Interface& interface, std::int64_t window, const std::vector<geometry::Vec3>& forces);
+  void add_to_load(const Interface& interface, std::int64_t window,
+                   const std::vector<geometry::Vec3>& forces);
   void note_quantities(const Crew::Answer& answer, std::int64_t window);
   bool is_complete(std::int64_t window) const;
   void close_window();
   void check_limits(const WindowRecord& window) const;
 
   std::int64_t span_count() const;
-  std::pair<std::int64_t, std::int64_t> span(std::int64_t index) const;  // first window and one past the last
-  std::int64_t span_of(std::int64_t window) const;                       // −1 where receivers get nothing of it
+  std::pair<std::int64_t, std::int64_t> span(
+      std::int64_t index) const;                    // first window and one past the last
+  std::int64_t span_of(std::int64_t window) const;  // −1 where receivers get nothing of it
 
   const Case& case_;
   Crew& crew_;
@@ -66,11 +70,13 @@ class OneWay {
   Quantities& quantities_;
   Reporter& reporter_;
   std::vector<Interface> links_;
-  std::map<std::string, std::int64_t> senders_;  // windows answered; participants without a surface are senders of nothing
+  std::map<std::string, std::int64_t>
+      senders_;  // windows answered; participants without a surface are senders of nothing
   std::map<std::string, bool> sender_busy_;
   std::map<std::string, Receiver> receivers_;
-  std::map<std::int64_t, WindowRecord> open_;                        // windows under way
-  std::map<std::int64_t, std::map<std::string, std::vector<geometry::Vec3>>> loads_;  // span → "to" surface → forces
+  std::map<std::int64_t, WindowRecord> open_;  // windows under way
+  std::map<std::int64_t, std::map<std::string, std::vector<geometry::Vec3>>>
+      loads_;  // span → "to" surface → forces
   std::int64_t complete_ = 0;
   Ledgers ledgers_;
   std::vector<InterfaceOutcome> interfaces_;

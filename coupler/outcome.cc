@@ -33,33 +33,38 @@ Json participants_of(const Outcome& outcome) {
 }
 
 Json summary_of(const Outcome& outcome) {
-  return {{"schema", 1},
-          {"case", outcome.title},
-          {"status", name_of(outcome.status)},
-          {"time", {{"end", outcome.end}, {"reached", outcome.reached}, {"windows", outcome.windows}}},
-          {"expectations", expectations_of(outcome)},
-          {"ledgers",
-           {{"force_loss", outcome.ledgers.force_loss},
-            {"moment_loss", outcome.ledgers.moment_loss},
-            {"energy_made", outcome.ledgers.energy_made},
-            {"unmapped", outcome.ledgers.unmapped},
-            {"worst_distance", outcome.ledgers.worst_distance}}},
-          {"participants", participants_of(outcome)},
-          {"seconds", outcome.seconds},
-          {"error", outcome.error ? Json{{"participant", outcome.error->participant},
-                                         {"state", outcome.error->state},
-                                         {"message", outcome.error->message}}
-                                  : Json(nullptr)}};
+  return {
+      {"schema", 1},
+      {"case", outcome.title},
+      {"status", name_of(outcome.status)},
+      {"time", {{"end", outcome.end}, {"reached", outcome.reached}, {"windows", outcome.windows}}},
+      {"expectations", expectations_of(outcome)},
+      {"ledgers",
+       {{"force_loss", outcome.ledgers.force_loss},
+        {"moment_loss", outcome.ledgers.moment_loss},
+        {"energy_made", outcome.ledgers.energy_made},
+        {"unmapped", outcome.ledgers.unmapped},
+        {"worst_distance", outcome.ledgers.worst_distance}}},
+      {"participants", participants_of(outcome)},
+      {"seconds", outcome.seconds},
+      {"error", outcome.error ? Json{{"participant", outcome.error->participant},
+                                     {"state", outcome.error->state},
+                                     {"message", outcome.error->message}}
+                              : Json(nullptr)}};
 }
 
 }  // namespace
 
 std::string_view name_of(Status status) {
   switch (status) {
-    case Status::met: return "met";
-    case Status::missed: return "missed";
-    case Status::failed: return "failed";
-    case Status::interrupted: return "interrupted";
+    case Status::met:
+      return "met";
+    case Status::missed:
+      return "missed";
+    case Status::failed:
+      return "failed";
+    case Status::interrupted:
+      return "interrupted";
   }
   return "failed";
 }
@@ -75,11 +80,12 @@ nlohmann::ordered_json to_json(const Outcome& outcome) {
   json["exit_code"] = outcome.exit_code;
   json["interfaces"] = Json::array();
   for (const auto& interface : outcome.interfaces)
-    json["interfaces"].push_back({{"name", interface.name},
-                                  {"sent", {interface.sent[0], interface.sent[1], interface.sent[2]}},
-                                  {"received", {interface.received[0], interface.received[1], interface.received[2]}},
-                                  {"loss", interface.loss},
-                                  {"worst_loss", interface.worst_loss}});
+    json["interfaces"].push_back(
+        {{"name", interface.name},
+         {"sent", {interface.sent[0], interface.sent[1], interface.sent[2]}},
+         {"received", {interface.received[0], interface.received[1], interface.received[2]}},
+         {"loss", interface.loss},
+         {"worst_loss", interface.worst_loss}});
   json["quantities"] = Json::array();
   for (const auto& [name, value] : outcome.quantities) json["quantities"].push_back({name, value});
   for (const auto& participant : outcome.participants)

@@ -32,9 +32,9 @@ struct Ledgers {
 
 struct ParticipantOutcome {
   std::string name, solver;
-  double seconds = 0;          ///< between a request and its answer [s]
-  double seconds_waiting = 0;  ///< without a request, while the run went on [s]
-  double seconds_starting = 0; ///< of `seconds`, from welcome to the surfaces [s]
+  double seconds = 0;           ///< between a request and its answer [s]
+  double seconds_waiting = 0;   ///< without a request, while the run went on [s]
+  double seconds_starting = 0;  ///< of `seconds`, from welcome to the surfaces [s]
   std::uint64_t steps = 0;
   std::uint64_t peak_bytes = 0;
 };
@@ -50,13 +50,14 @@ struct Outcome {
   Status status = Status::failed;
   int exit_code = 1;
   std::string title;
-  double end = 0, reached = 0;     ///< [s]
-  std::int64_t windows = 0;        ///< complete
+  double end = 0, reached = 0;  ///< [s]
+  std::int64_t windows = 0;     ///< complete
   std::vector<Checked> expectations;
   Ledgers ledgers;
   std::vector<ParticipantOutcome> participants;
   std::vector<InterfaceOutcome> interfaces;
-  std::vector<std::pair<std::string, double>> quantities;  ///< last value of each, "participant.quantity"
+  std::vector<std::pair<std::string, double>>
+      quantities;  ///< last value of each, "participant.quantity"
   double seconds = 0;
   struct Error {
     std::string participant, state, message;

@@ -39,7 +39,8 @@ std::vector<Notice> ProcessOutside::read() {
 
 void ProcessOutside::read_signals(std::vector<Notice>& notices) {
   signalfd_siginfo info;
-  while (::read(signals_, &info, sizeof info) == static_cast<ssize_t>(sizeof info)) notices.push_back({});
+  while (::read(signals_, &info, sizeof info) == static_cast<ssize_t>(sizeof info))
+    notices.push_back({});
 }
 
 void ProcessOutside::read_launcher(std::vector<Notice>& notices) {
@@ -54,7 +55,8 @@ void ProcessOutside::read_launcher(std::vector<Notice>& notices) {
   }
   if (gone) {
     listens_ = false;
-    notices.push_back({});  // without a launcher nobody waits for the results: the same as an interrupt
+    notices.push_back(
+        {});  // without a launcher nobody waits for the results: the same as an interrupt
   }
 }
 
@@ -72,7 +74,9 @@ Notice notice_from_line(const std::string& line) {
   const auto read = nlohmann::json::parse(line);
   Notice notice;
   const auto event = read.at("event").get<std::string>();
-  notice.kind = event == "exited" ? Notice::Kind::exited : event == "stopped" ? Notice::Kind::stopped : Notice::Kind::interrupt;
+  notice.kind = event == "exited"    ? Notice::Kind::exited
+                : event == "stopped" ? Notice::Kind::stopped
+                                     : Notice::Kind::interrupt;
   notice.participant = read.at("participant").get<std::string>();
   notice.how = read.at("how").get<std::string>();
   notice.mistake = read.at("mistake").get<bool>();

@@ -1,4 +1,5 @@
-// What reaches the coupler from outside the protocol: signals, and the notices of the launcher that started everybody.
+// What reaches the coupler from outside the protocol: signals, and the notices of the launcher that
+// started everybody.
 #pragma once
 
 #include <string>
@@ -23,8 +24,9 @@ class Outside {
   virtual std::vector<Notice> read() { return {}; }
 };
 
-/// SIGINT and SIGTERM of this process and, under a launcher, its notices as lines of JSON on the standard input, whose end
-/// means that the launcher is gone. Construct it before any thread: it blocks the signals for all of them.
+/// SIGINT and SIGTERM of this process and, under a launcher, its notices as lines of JSON on the
+/// standard input, whose end means that the launcher is gone. Construct it before any thread: it
+/// blocks the signals for all of them.
 class ProcessOutside final : public Outside {
  public:
   explicit ProcessOutside(bool supervised);
@@ -42,7 +44,8 @@ class ProcessOutside final : public Outside {
   std::string unfinished_;
 };
 
-/// A notice as the line that the launcher writes, and back. @throws std::exception for a line that is none
+/// A notice as the line that the launcher writes, and back. @throws std::exception for a line that
+/// is none
 std::string to_line(const Notice& notice);
 Notice notice_from_line(const std::string& line);
 

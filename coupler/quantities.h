@@ -15,14 +15,15 @@ class Quantities {
   /// @param name  "participant.quantity"; @param end  of the window it was reported for [s]
   void add(const std::string& name, double end, double value);
 
-  /// The expectation against the last report not later than `at` or, with `mean_over`, the mean of all reports whose
-  /// windows end within that time before `at`.
+  /// The expectation against the last report not later than `at` or, with `mean_over`, the mean of
+  /// all reports whose windows end within that time before `at`.
   Checked check(const Expectation& expectation) const;
   /// The last value of each, in the order of first report.
   std::vector<std::pair<std::string, double>> last() const;
 
  private:
-  std::map<std::string, std::vector<std::pair<double, double>>> reports_;  // end of window [s], value
+  std::map<std::string, std::vector<std::pair<double, double>>>
+      reports_;  // end of window [s], value
   std::vector<std::string> order_;
 };
 

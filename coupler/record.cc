@@ -31,7 +31,8 @@ void Record::write(std::int64_t index, const WindowRecord& window) {
   if (!series_) return;
   series_->begin_window(case_.time(index), case_.time(index + 1));
   for (const auto& [name, force] : window.forces) series_->add_field(name, "force", force);
-  for (const auto& [name, value] : window.quantities) series_->add_scalar("quantities/" + name, value);
+  for (const auto& [name, value] : window.quantities)
+    series_->add_scalar("quantities/" + name, value);
   write_ledger(window);
   series_->flush();
   const auto complete = index + 1;
@@ -47,9 +48,11 @@ void Record::write_ledger(const WindowRecord& window) {
     const auto name = fmt::format("ledger/{}/", case_.interfaces[k].text());
     for (int d = 0; d < 3; ++d) {
       series_->add_scalar(fmt::format("{}sent.force.{}", name, "xyz"[d]), row.sent.force[d]);
-      series_->add_scalar(fmt::format("{}received.force.{}", name, "xyz"[d]), row.received.force[d]);
+      series_->add_scalar(fmt::format("{}received.force.{}", name, "xyz"[d]),
+                          row.received.force[d]);
       series_->add_scalar(fmt::format("{}sent.moment.{}", name, "xyz"[d]), row.sent.moment[d]);
-      series_->add_scalar(fmt::format("{}received.moment.{}", name, "xyz"[d]), row.received.moment[d]);
+      series_->add_scalar(fmt::format("{}received.moment.{}", name, "xyz"[d]),
+                          row.received.moment[d]);
     }
     series_->add_scalar(name + "force_loss", row.loss.force);
     series_->add_scalar(name + "moment_loss", row.loss.moment);
@@ -65,7 +68,8 @@ void Record::write_ledger(const WindowRecord& window) {
   series_->add_scalar("ledger/energy_made", 0);
 }
 
-void Record::write_picture(std::int64_t index, const std::string& surface, const std::vector<Vec3>& force) {
+void Record::write_picture(std::int64_t index, const std::string& surface,
+                           const std::vector<Vec3>& force) {
   io::PointData data{"force", 3, {}};
   for (const auto& f : force) data.values.insert(data.values.end(), f.data(), f.data() + 3);
   const auto file = fmt::format("{}/surfaces/{}_{:05}.vtp", folder_, surface, index + 1);

@@ -1,4 +1,5 @@
-// What a run leaves behind: interface.h5, which can be replayed, and pictures of the loaded surfaces.
+// What a run leaves behind: interface.h5, which can be replayed, and pictures of the loaded
+// surfaces.
 #pragma once
 
 #include <map>
@@ -7,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "coupler/mapping/balance.h"
 #include "coupler/case.h"
+#include "coupler/mapping/balance.h"
 #include "io/series.h"
 #include "io/vtk.h"
 
@@ -22,9 +23,9 @@ struct LedgerRow {
 
 /// Everything of one window, gathered until all participants are through it.
 struct WindowRecord {
-  std::vector<LedgerRow> ledger;                                      ///< one per interface of the case
-  std::map<std::string, std::vector<geometry::Vec3>> forces;          ///< "grains.box" → one per point [N]
-  std::vector<std::pair<std::string, double>> quantities;             ///< "participant.quantity"
+  std::vector<LedgerRow> ledger;                              ///< one per interface of the case
+  std::map<std::string, std::vector<geometry::Vec3>> forces;  ///< "grains.box" → one per point [N]
+  std::vector<std::pair<std::string, double>> quantities;     ///< "participant.quantity"
 };
 
 class Record {
@@ -39,7 +40,8 @@ class Record {
 
  private:
   void write_ledger(const WindowRecord& window);
-  void write_picture(std::int64_t index, const std::string& surface, const std::vector<geometry::Vec3>& force);
+  void write_picture(std::int64_t index, const std::string& surface,
+                     const std::vector<geometry::Vec3>& force);
 
   const Case& case_;
   std::string folder_;

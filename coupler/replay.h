@@ -11,9 +11,9 @@
 
 namespace acopla::coupler {
 
-/// Plays the surfaces of one participant from an interface.h5: the time [at, at + to − from] of the run is the recorded
-/// time [from, to]; outside it the forces are zero. A window that is a recorded one gets its forces bit for bit; any
-/// other gets the mean of the recorded means over it.
+/// Plays the surfaces of one participant from an interface.h5: the time [at, at + to − from] of the
+/// run is the recorded time [from, to]; outside it the forces are zero. A window that is a recorded
+/// one gets its forces bit for bit; any other gets the mean of the recorded means over it.
 class Replay final : public protocol::Participant {
  public:
   /// @param name  of the participant that it stands for
@@ -22,11 +22,13 @@ class Replay final : public protocol::Participant {
 
   protocol::Introduction introduce() const override;
   std::vector<protocol::Surface> start(const protocol::Run& run) override;
-  protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override;
+  protocol::Advance advance(const protocol::Window& window,
+                            const std::vector<protocol::Field>& received) override;
 
  private:
   std::string owner() const;
-  std::vector<geometry::Vec3> mean_force(const std::string& surface, std::size_t points, double start, double end) const;
+  std::vector<geometry::Vec3> mean_force(const std::string& surface, std::size_t points,
+                                         double start, double end) const;
 
   ReplayCase replay_;
   std::string name_;

@@ -16,7 +16,8 @@ class Reporter {
   /// Everybody is there and the surfaces are mapped; `seconds` since the start.
   virtual void assembled(double /*seconds*/) {}
   /// `window` of `windows` are complete, up to `time` [s], after `seconds` of computing windows.
-  virtual void progress(std::int64_t /*window*/, std::int64_t /*windows*/, double /*time*/, double /*seconds*/) {}
+  virtual void progress(std::int64_t /*window*/, std::int64_t /*windows*/, double /*time*/,
+                        double /*seconds*/) {}
   /// Something worth a line in the log that does not stop the run.
   virtual void note(const std::string& /*text*/) {}
   virtual void done(const Outcome& /*outcome*/) {}

@@ -248,26 +248,38 @@ class EngineOf final : public Engine {
   // time: all lanes of a batch share their parameters.
   void pair_forces(double step) {
     touching_ = 0;
+    if (materials_ == 1) find_touching([this](std::uint32_t, std::uint32_t) -> Batch& { return batches_[0]; }, step);
+    else
+      find_touching(
+          [this](std::uint32_t i, std::uint32_t j) -> Batch& { return batches_[particles_.material[i] * materials_ + particles_.material[j]]; }, step);
+    for (auto& batch : batches_) run_batch(batch, step);
+  }
+
+  template <class BatchOf>
+  void find_touching(const BatchOf& batch_of, double step) {
     const auto n = static_cast<std::uint32_t>(particles_.size());
+    const Record* const position = particles_.position.data();
+    const std::uint32_t* const second = pairs_.second.data();
+    [[maybe_unused]] std::uint8_t* const was_touching = was_touching_.data();
     for (std::uint32_t i = 0; i < n; ++i) {
-      const Record a = particles_.position[i];
-      const auto row = particles_.material[i] * materials_;
-      for (auto k = pairs_.start[i]; k < pairs_.start[i + 1]; ++k) {
-        const auto j = pairs_.second[k];
-        const Record& b = particles_.position[j];
+      const Record a = position[i];
+      const auto end = pairs_.start[i + 1];
+      for (auto k = pairs_.start[i]; k < end; ++k) {
+        const auto j = second[k];
+        const Record& b = position[j];
         const double dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z, reach = a.w + b.w;
         const bool touches = dx * dx + dy * dy + dz * dz < reach * reach;
         if constexpr (Model::has_history) {
-          if (!touches && was_touching_[k]) history_[k] = Record{};
-          was_touching_[k] = touches;
+          if (was_touching[k] > touches) history_[k] = Record{};  // it has just ended
+          was_touching[k] = touches;
         }
-        auto& batch = batches_[materials_ == 1 ? 0 : row + particles_.material[j]];
-        batch.candidates[batch.count] = {i, j, k};
-        batch.count += touches;
-        if (batch.count == batch_size) run_batch(batch, step);
+        auto& batch = batch_of(i, j);
+        const auto count = batch.count;
+        batch.candidates[count] = {i, j, k};
+        batch.count = count + touches;
+        if (count + touches == batch_size) run_batch(batch, step);
       }
     }
-    for (auto& batch : batches_) run_batch(batch, step);
   }
 
   void run_batch(Batch& batch, double step) {

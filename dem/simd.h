@@ -55,11 +55,10 @@ struct Record4 {
 };
 
 inline Record4 transposed(const Double4::Vector& a, const Double4::Vector& b, const Double4::Vector& c, const Double4::Vector& d) {
-  const Mask4::Vector even{0, 4, 2, 6}, odd{1, 5, 3, 7}, low{0, 1, 4, 5}, high{2, 3, 6, 7};
-  const auto ab_even = __builtin_shuffle(a, b, even), ab_odd = __builtin_shuffle(a, b, odd);
-  const auto cd_even = __builtin_shuffle(c, d, even), cd_odd = __builtin_shuffle(c, d, odd);
-  return {Double4(__builtin_shuffle(ab_even, cd_even, low)), Double4(__builtin_shuffle(ab_odd, cd_odd, low)),
-          Double4(__builtin_shuffle(ab_even, cd_even, high)), Double4(__builtin_shuffle(ab_odd, cd_odd, high))};
+  const auto ab_even = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab_odd = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+  const auto cd_even = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd_odd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+  return {Double4(__builtin_shufflevector(ab_even, cd_even, 0, 1, 4, 5)), Double4(__builtin_shufflevector(ab_odd, cd_odd, 0, 1, 4, 5)),
+          Double4(__builtin_shufflevector(ab_even, cd_even, 2, 3, 6, 7)), Double4(__builtin_shufflevector(ab_odd, cd_odd, 2, 3, 6, 7))};
 }
 
 // A record is four aligned doubles, so it may be read and written as one vector.

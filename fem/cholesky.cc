@@ -1,18 +1,30 @@
 #include "fem/cholesky.h"
 
 #include <cholmod.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
-#include "fem/supernodal.h"
 #include "io/error.h"
+
+extern "C" void dgemm_(const char* transpose_a, const char* transpose_b, const int* m, const int* n,
+                       const int* k, const double* alpha, const double* a, const int* lda,
+                       const double* b, const int* ldb, const double* beta, double* c,
+                       const int* ldc);
 
 namespace acopla::fem {
 namespace {
 
 using Index = SuiteSparse_long;
+
+/// A pivot this small against the diagonal it came from is round-off: the structure is a mechanism.
+/// The softest slender beam of practice keeps about 1e-10.
+constexpr double least_pivot = 1e-14;
 
 [[noreturn]] void out_of_memory(const std::string& purpose) {
   throw std::runtime_error("not enough memory to " + purpose + " the structure's stiffness");
@@ -31,27 +43,45 @@ struct FreeUnknowns {
   }
 };
 
-/// The pattern of a symmetric matrix's lower triangle by columns.
-/// @param visit  visit(j, f) calls f(i) for the entries of column j, above the diagonal too
+/// The lower triangle of a symmetric matrix by columns, rows of a column in any order.
+/// @param xtype  CHOLMOD_REAL, or CHOLMOD_PATTERN to leave the values out
+/// @param visit  visit(j, f) calls f(i, value) for the entries of column j, above the diagonal too
 template <class Visit>
-cholmod_sparse* lower_pattern(std::size_t columns, const Visit& visit, cholmod_common& common) {
+cholmod_sparse* lower_triangle(std::size_t columns, int xtype, const Visit& visit,
+                               cholmod_common& common) {
   std::size_t entries = 0;
   for (std::size_t j = 0; j < columns; ++j)
-    visit(j, [&](Index i) { entries += i >= static_cast<Index>(j); });
-  auto* result =
-      cholmod_l_allocate_sparse(columns, columns, entries, 1, 1, -1, CHOLMOD_PATTERN, &common);
-  if (!result) out_of_memory("analyse");
+    visit(j, [&](Index i, double) { entries += i >= static_cast<Index>(j); });
+  auto* result = cholmod_l_allocate_sparse(columns, columns, entries, 0, 1, -1, xtype, &common);
+  if (!result) return nullptr;
   auto* starts = static_cast<Index*>(result->p);
   auto* rows = static_cast<Index*>(result->i);
+  auto* values = static_cast<double*>(result->x);
   Index next = 0;
   for (std::size_t j = 0; j < columns; ++j) {
     starts[j] = next;
-    visit(j, [&](Index i) {
-      if (i >= static_cast<Index>(j)) rows[next++] = i;
+    visit(j, [&](Index i, double value) {
+      if (i < static_cast<Index>(j)) return;
+      if (values) values[next] = value;
+      rows[next++] = i;
     });
   }
   starts[columns] = next;
   return result;
+}
+
+/// Calls `set(count)` if a library that the process has loaded offers it.
+void set_threads(const char* set, int count) {
+  if (auto* function = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, set))) function(count);
+}
+
+/// One thread for the BLAS, if it is OpenBLAS, and for CHOLMOD: the particles use the other cores
+/// at the same time, the sums of a product cut in threads may differ from run to run, and the four
+/// OpenMP threads that CHOLMOD always asks for to scatter its updates cost 1.4 to 1.9 times the
+/// processor time of one.
+void compute_in_one_thread() {
+  set_threads("openblas_set_num_threads", 1);
+  set_threads("omp_set_max_active_levels", 0);
 }
 
 }  // namespace
@@ -77,18 +107,37 @@ struct Cholesky::State {
 
   std::vector<Index> order();
   void analyse(std::vector<Index> order);
-  void add_column(Index j, const std::vector<Index>& places, const Index* local, double* column);
+  cholmod_sparse* ordered_matrix();
+  double diagonal(std::size_t unknown) const;
+  std::optional<std::size_t> first_round_off() const;
+
+  /// The free unknown at a column of the factor.
+  std::size_t unknown_of(std::size_t column) const {
+    const auto position = static_cast<const Index*>(factor->Perm)[column];
+    return free.unknowns[static_cast<std::size_t>(position)];
+  }
+  /// Calls entry(position, value) for the free unknowns that couple with `unknown`.
+  template <class Entry>
+  void visit_row(std::size_t unknown, Entry&& entry) const {
+    const auto row = matrix.row(unknown / 3);
+    for (std::size_t k = 0; k < row.size(); ++k)
+      for (std::size_t d = 0; d < 3; ++d) {
+        const auto position = free.positions[3 * std::size_t{row[k]} + d];
+        if (position >= 0) entry(position, matrix.block(unknown / 3, k)[3 * (unknown % 3) + d]);
+      }
+  }
 };
 
 /// An order of the free unknowns that keeps the factor small, found on the graph of the nodes (a
 /// ninth of the edges) and expanded to their directions.
 std::vector<Index> Cholesky::State::order() {
-  auto* graph = lower_pattern(
-      matrix.nodes(),
+  auto* graph = lower_triangle(
+      matrix.nodes(), CHOLMOD_PATTERN,
       [&](std::size_t n, auto&& entry) {
-        for (const auto m : matrix.row(n)) entry(static_cast<Index>(m));
+        for (const auto m : matrix.row(n)) entry(static_cast<Index>(m), 0.0);
       },
       common);
+  if (!graph) out_of_memory("order");
   std::vector<Index> nodes(matrix.nodes()), result;
   const int done = cholmod_l_metis(graph, nullptr, 0, 1, nodes.data(), &common);
   cholmod_l_free_sparse(&graph, &common);
@@ -103,11 +152,10 @@ std::vector<Index> Cholesky::State::order() {
 }
 
 void Cholesky::State::analyse(std::vector<Index> order) {
-  const auto visit = [&](std::size_t j, auto&& entry) {
-    for (const auto m : matrix.row(free.unknowns[j] / 3))
-      for (std::size_t d = 0; d < 3; ++d) entry(free.positions[3 * std::size_t{m} + d]);
-  };
-  auto* pattern = lower_pattern(free.unknowns.size(), visit, common);
+  auto* pattern = lower_triangle(
+      free.unknowns.size(), CHOLMOD_PATTERN,
+      [&](std::size_t j, auto&& entry) { visit_row(free.unknowns[j], entry); }, common);
+  if (!pattern) out_of_memory("analyse");
   common.supernodal = CHOLMOD_SUPERNODAL;
   common.nmethods = 1;
   common.method[0].ordering = CHOLMOD_GIVEN;
@@ -117,18 +165,44 @@ void Cholesky::State::analyse(std::vector<Index> order) {
   flops = common.fl;
 }
 
-void Cholesky::State::add_column(Index j, const std::vector<Index>& places, const Index* local,
-                                 double* column) {
-  const auto from = static_cast<const Index*>(factor->Perm)[j];
-  const auto unknown = free.unknowns[static_cast<std::size_t>(from)];
-  const auto row = matrix.row(unknown / 3);
-  for (std::size_t k = 0; k < row.size(); ++k)
-    for (std::size_t d = 0; d < 3; ++d) {
-      const auto position = free.positions[3 * std::size_t{row[k]} + d];
-      if (position < 0) continue;
-      const auto place = places[static_cast<std::size_t>(position)];
-      if (place >= j) column[local[place]] += matrix.block(unknown / 3, k)[3 * (unknown % 3) + d];
-    }
+/// The matrix in the factor's order.
+cholmod_sparse* Cholesky::State::ordered_matrix() {
+  const auto* order = static_cast<const Index*>(factor->Perm);
+  std::vector<Index> columns(factor->n);
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    columns[static_cast<std::size_t>(order[j])] = static_cast<Index>(j);
+  const auto visit = [&](std::size_t j, auto&& entry) {
+    visit_row(unknown_of(j), [&](Index position, double value) {
+      entry(columns[static_cast<std::size_t>(position)], value);
+    });
+  };
+  return lower_triangle(columns.size(), CHOLMOD_REAL, visit, common);
+}
+
+double Cholesky::State::diagonal(std::size_t unknown) const {
+  const auto node = unknown / 3;
+  const auto row = matrix.row(node);
+  const auto k = std::lower_bound(row.begin(), row.end(), node) - row.begin();
+  return matrix.block(node, static_cast<std::size_t>(k))[4 * (unknown % 3)];
+}
+
+/// The first column of the factor without a sound pivot. CHOLMOD stops at pivots that are not
+/// positive only; a mechanism's may be round-off of either sign.
+std::optional<std::size_t> Cholesky::State::first_round_off() const {
+  const auto* starts = static_cast<const Index*>(factor->super);
+  const auto* row_starts = static_cast<const Index*>(factor->pi);
+  const auto* value_starts = static_cast<const Index*>(factor->px);
+  const auto* values = static_cast<const double*>(factor->x);
+  for (std::size_t s = 0, j = 0; j < factor->minor; ++j) {
+    if (static_cast<Index>(j) == starts[s + 1]) ++s;
+    const Index column = static_cast<Index>(j) - starts[s];
+    const Index height = row_starts[s + 1] - row_starts[s];
+    const double pivot = values[value_starts[s] + column * (height + 1)];
+    const bool sound = pivot * pivot > least_pivot * diagonal(unknown_of(j));
+    if (!sound) return j;
+  }
+  if (factor->minor < factor->n) return factor->minor;
+  return std::nullopt;
 }
 
 Cholesky::Cholesky(const BlockMatrix& matrix, const Fixed& fixed)
@@ -149,16 +223,17 @@ double Cholesky::flops() const { return state_->flops; }
 
 void Cholesky::factor(const std::vector<Vec3>& points) {
   auto& s = *state_;
-  const auto* order = static_cast<const Index*>(s.factor->Perm);
-  std::vector<Index> places(s.factor->n);
-  for (std::size_t j = 0; j < places.size(); ++j)
-    places[static_cast<std::size_t>(order[j])] = static_cast<Index>(j);
-  const auto add = [&](Index j, const Index* local, double* column) {
-    s.add_column(j, places, local, column);
-  };
-  const auto failed = factor_supernodes(*s.factor, s.common, add);
+  compute_in_one_thread();
+  // What cholmod_l_factorize calls in the end, after two more copies of the matrix.
+  auto* matrix = s.ordered_matrix();
+  double nothing_added[2] = {0, 0};
+  const bool done =
+      matrix && cholmod_l_super_numeric(matrix, nullptr, nothing_added, s.factor, &s.common);
+  cholmod_l_free_sparse(&matrix, &s.common);
+  if (!done) out_of_memory("factor");
+  const auto failed = s.first_round_off();
   if (!failed) return;
-  const auto unknown = s.free.unknowns[static_cast<std::size_t>(order[*failed])];
+  const auto unknown = s.unknown_of(*failed);
   const auto& p = points[unknown / 3];
   throw io::UserError(fmt::format(
       "The structure is a mechanism: near ({:.4g}, {:.4g}, {:.4g}) it can move along {} without "
@@ -179,6 +254,23 @@ void Cholesky::solve(const Vector& b, Vector& x) {
   x = Vector::Zero(b.size());
   for (std::size_t i = 0; i < count; ++i)
     x[static_cast<Eigen::Index>(s.free.unknowns[i])] = static_cast<const double*>(s.x->x)[i];
+}
+
+double blas_rate() {
+  using Clock = std::chrono::steady_clock;
+  constexpr int n = 400;
+  constexpr double one = 1, zero = 0;
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Constant(n, n, 1.0);
+  Eigen::MatrixXd b(n, n);
+  compute_in_one_thread();
+  double best = 0;
+  for (int trial = 0; trial < 3; ++trial) {
+    const auto start = Clock::now();
+    dgemm_("N", "T", &n, &n, &n, &one, a.data(), &n, a.data(), &n, &zero, b.data(), &n);
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    best = std::max(best, 2.0 * n * n * n / seconds);
+  }
+  return best;
 }
 
 }  // namespace acopla::fem

@@ -68,7 +68,7 @@ struct SeriesWriter::File {
     for (const auto extent : row) {
       size.push_back(extent);
       limit.push_back(extent);
-      chunk.push_back(extent);
+      chunk.push_back(std::max<hsize_t>(extent, 1));  // a surface may be empty, a chunk may not
       values *= extent;
     }
     if (values < 512) chunk[0] = 512 / std::max<hsize_t>(values, 1);  // small rows share a chunk

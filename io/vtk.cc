@@ -57,10 +57,10 @@ void write_poly_data(const std::string& path, std::span<const Eigen::Vector3d> p
   Appended appended;
   std::string xml = "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
                     "header_type=\"UInt64\">\n<PolyData>\n";
-  const bool vertices = std::strcmp(cells, "Verts") == 0;
-  xml += fmt::format("<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"0\" NumberOfStrips=\"0\" "
+  const auto count = [&](const char* kind) { return std::strcmp(cells, kind) == 0 ? offsets.size() : 0; };
+  xml += fmt::format("<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"{}\" NumberOfStrips=\"0\" "
                      "NumberOfPolys=\"{}\">\n<PointData>\n",
-                     points.size(), vertices ? offsets.size() : 0, vertices ? 0 : offsets.size());
+                     points.size(), count("Verts"), count("Lines"), count("Polys"));
   for (const auto& field : data)  // single precision is what a picture needs; the HDF5 series keeps doubles
     xml += appended.array(field.name, field.components, std::vector<float>(field.values.begin(), field.values.end()));
   xml += "</PointData>\n<Points>\n" + appended.array("Points", 3, flat(points)) + "</Points>\n";
@@ -90,7 +90,8 @@ void write_surface(const std::string& path, const geometry::SurfaceMesh& mesh, c
       nodes.push_back(static_cast<std::int32_t>(all[k]));
     offsets.push_back(static_cast<std::int32_t>(nodes.size()));
   }
-  write_poly_data(path, mesh.points, data, "Polys", nodes, offsets);
+  const bool lines = mesh.face_count() > 0 && geometry::corners_of(mesh.kind(0)) == 2;  // two dimensions
+  write_poly_data(path, mesh.points, data, lines ? "Lines" : "Polys", nodes, offsets);
 }
 
 void PvdSeries::add(double time, const std::string& file) {

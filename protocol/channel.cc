@@ -23,17 +23,17 @@ void check_endpoint(const std::string& endpoint) {
 
 bool send(zmq::socket_t& socket, const Message& message, const std::string& identity) {
   try {
-    if (!identity.empty()) socket.send(zmq::buffer(identity), zmq::send_flags::sndmore);
+    if (!identity.empty() && !socket.send(zmq::buffer(identity), zmq::send_flags::sndmore)) return false;
     const auto header = encode_header(message);
     const auto more = [](bool yes) { return yes ? zmq::send_flags::sndmore : zmq::send_flags::none; };
-    socket.send(zmq::buffer(header), more(!message.arrays.empty()));
+    if (!socket.send(zmq::buffer(header), more(!message.arrays.empty()))) return false;  // timed out
     for (std::size_t k = 0; k < message.arrays.size(); ++k) {
       const auto& array = message.arrays[k];
       // ZeroMQ frees the frame from its own thread; the shared owner makes that safe.
       auto* keep = new std::shared_ptr<const void>(array.owner());
       zmq::message_t frame(const_cast<std::byte*>(array.bytes().data()), array.bytes().size(),
                            [](void*, void* hint) { delete static_cast<std::shared_ptr<const void>*>(hint); }, keep);
-      socket.send(frame, more(k + 1 < message.arrays.size()));
+      if (!socket.send(frame, more(k + 1 < message.arrays.size()))) return false;
     }
     return true;
   } catch (const zmq::error_t& error) {
@@ -77,13 +77,16 @@ std::optional<Parcel> receive_parcel(zmq::socket_t& socket, std::chrono::millise
 Channel::Channel(zmq::context_t& context, const std::string& endpoint) : socket_(context, zmq::socket_type::dealer) {
   check_endpoint(endpoint);
   socket_.set(zmq::sockopt::linger, 2000);  // last words reach the coupler
+  socket_.set(zmq::sockopt::sndtimeo, 2000);  // without a peer a send would wait for ever
   socket_.set(zmq::sockopt::reconnect_ivl, 20);  // ms; the coupler may bind after we connect
   socket_.set(zmq::sockopt::sndhwm, 0);
   socket_.set(zmq::sockopt::rcvhwm, 0);
   socket_.connect(endpoint);
 }
 
-void Channel::send(const Message& message) { protocol::send(socket_, message); }
+void Channel::send(const Message& message) {
+  if (!protocol::send(socket_, message)) throw ProtocolError("the coupler is gone: nothing can be sent to it");
+}
 
 std::optional<Message> Channel::receive(std::chrono::milliseconds wait) {
   const auto parcel = receive_parcel(socket_, wait, false);

@@ -14,7 +14,7 @@ namespace acopla::protocol {
 void check_endpoint(const std::string& endpoint);
 
 /// Sends a message, its arrays without a copy. `identity` addresses a peer of a ROUTER; empty for other sockets.
-/// @return false when the peer is gone
+/// @return false when the peer is gone, or the socket's time for sending is over
 bool send(zmq::socket_t& socket, const Message& message, const std::string& identity = {});
 
 /// Frames of one message as they arrived, header first; the identity frame of a ROUTER is split off.
@@ -29,6 +29,7 @@ std::optional<Parcel> receive_parcel(zmq::socket_t& socket, std::chrono::millise
 class Channel {
  public:
   Channel(zmq::context_t& context, const std::string& endpoint);
+  /// @throws ProtocolError when no coupler takes it within two seconds
   void send(const Message& message);
   /// @throws ProtocolError when what came is not a message
   std::optional<Message> receive(std::chrono::milliseconds wait);

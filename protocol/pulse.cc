@@ -89,6 +89,7 @@ void PulseMonitor::run() {
 Pulse::Pulse(zmq::context_t& context, const std::string& endpoint, std::string participant)
     : socket_(context, zmq::socket_type::dealer), participant_(std::move(participant)), last_ping_(Clock::now()) {
   socket_.set(zmq::sockopt::linger, 0);
+  socket_.set(zmq::sockopt::sndtimeo, 0);  // without a coupler a send would wait for ever, and with it our end
   socket_.connect(endpoint);
   thread_ = std::thread([this] { run(); });
 }

@@ -118,7 +118,10 @@ class Session {
 
   void report(const std::string& text, bool mistake = false) {
     if (coupler_knows_) return;
-    channel_.send(error_message(text, state_, false, mistake));
+    try {
+      channel_.send(error_message(text, state_, false, mistake));
+    } catch (const std::exception&) {  // nobody listens any more; the exception that is being reported goes on
+    }
   }
 
   Participant& participant_;

@@ -1,14 +1,15 @@
-// Coupler and participants in one process, over inproc: the coupled algorithms, their ledgers, and what goes wrong.
+// Coupler and participants in one process, over inproc: the coupled algorithms, their ledgers, and
+// what goes wrong.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <condition_variable>
 #include <filesystem>
-#include <functional>
-#include <optional>
 #include <fstream>
+#include <functional>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "coupler/coupler.h"
@@ -36,7 +37,8 @@ command = ["b"]
 )";
 
 // A case of ten windows of 0.1 s; `coupling` and `rest` are added to it.
-std::string case_text(const std::string& coupling = "", const std::string& rest = participants_text) {
+std::string case_text(const std::string& coupling = "",
+                      const std::string& rest = participants_text) {
   return R"(
 title = "loopback"
 dimension = 3
@@ -46,7 +48,8 @@ end = 1.0
 scheme = "one-way"
 window = 0.1
 max_distance = 0.05
-)" + coupling + R"(
+)" + coupling +
+         R"(
 [[coupling.interface]]
 from = "grains.box"
 to = "structure.inside"
@@ -65,6 +68,10 @@ class Ear : public coupler::Reporter {
     const std::lock_guard lock(mutex_);
     notes_.push_back(text);
     changed_.notify_all();
+  }
+  void close() {
+    const std::lock_guard lock(mutex_);
+    open_ = false;
   }
   void wait_until_open() {
     std::unique_lock lock(mutex_);
@@ -90,7 +97,8 @@ struct Served {
 
 class Loopback : public ::testing::Test {
  protected:
-  static constexpr const char* endpoint = "inproc://hub";
+  // ZeroMQ frees an inproc name some time after its socket is closed: every run has one of its own.
+  void next_endpoint() { endpoint = fmt::format("inproc://hub{}", ++runs_); }
 
   void SetUp() override {
     const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
@@ -119,8 +127,12 @@ class Loopback : public ::testing::Test {
   }
 
   // Runs the case with both stubs. `meanwhile` runs beside it, once the coupler is open.
-  Outcome run(const std::string& text, const std::string& where = "", const std::function<void()>& meanwhile = {}) {
-    const auto read = coupler::read_case(io::Table::from_text(text, (folder_ / "case.toml").string()));
+  Outcome run(const std::string& text, const std::string& where = "",
+              const std::function<void()>& meanwhile = {}) {
+    const auto read =
+        coupler::read_case(io::Table::from_text(text, (folder_ / "case.toml").string()));
+    next_endpoint();
+    ear_.close();
     Served a, b;
     if (!read.find("grains")->replay) serve(sender, "grains", a);
     serve(receiver, "structure", b);
@@ -128,7 +140,12 @@ class Loopback : public ::testing::Test {
       ear_.wait_until_open();
       if (meanwhile) meanwhile();
     });
-    const auto outcome = coupler::Coupler(context_, read, {endpoint, where}, ear_).run();
+    Outcome outcome;
+    try {
+      outcome = coupler::Coupler(context_, read, {endpoint, where}, ear_).run();
+    } catch (const std::exception& error) {  // threads are to be joined all the same
+      ADD_FAILURE() << error.what();
+    }
     beside.join();
     if (a.thread.joinable()) a.thread.join();
     b.thread.join();
@@ -141,7 +158,8 @@ class Loopback : public ::testing::Test {
   static std::vector<Vec3> mapped(std::int64_t window) {
     const auto from = stubs::square(7, true, 0.01), to = stubs::square(4, false);
     std::vector<Vec3> sent, received(to.points.size());
-    for (std::size_t p = 0; p < from.points.size(); ++p) sent.push_back(stubs::known_force(window, p));
+    for (std::size_t p = 0; p < from.points.size(); ++p)
+      sent.push_back(stubs::known_force(window, p));
     coupler::Mapping(from, to, {0.05}).forces(sent, received);
     return received;
   }
@@ -151,7 +169,10 @@ class Loopback : public ::testing::Test {
   std::filesystem::path folder_;
   stubs::Sender sender;
   stubs::Receiver receiver;
-  std::string sender_error, receiver_error;
+  std::string sender_error, receiver_error, endpoint;
+
+ private:
+  int runs_ = 0;
 };
 
 TEST_F(Loopback, HistoryGivesTheReceiverTheMappedForceOfEveryWindowBitForBit) {
@@ -251,7 +272,8 @@ TEST_F(Loopback, LedgersAreAtRoundOffAndAllIsRecorded) {
 
 TEST_F(Loopback, ALedgerBeyondItsLimitFailsTheRun) {
   // The mean of |F| cannot be kept to a relative 1e-30: round-off alone is more.
-  const auto outcome = run(case_text("limits = { force_loss = 0, moment_loss = 1e-30 }"), results("run"));
+  const auto outcome =
+      run(case_text("limits = { force_loss = 0, moment_loss = 1e-30 }"), results("run"));
   EXPECT_EQ(outcome.status, Status::failed);
   EXPECT_EQ(outcome.exit_code, io::exit_missed);
   EXPECT_EQ(outcome.error->participant, "grains.box to structure.inside");
@@ -263,8 +285,10 @@ TEST_F(Loopback, SurfacesTooFarApartAreAUsersMistakeAtTheInterface) {
   sender.height = 0.2;
   const auto outcome = run(case_text());
   EXPECT_EQ(outcome.exit_code, io::exit_user_error);
-  EXPECT_NE(outcome.error->message.find("case.toml:11:1: 64 of 64 points of grains.box are farther than max_distance = 0.05 m"),
-            std::string::npos)
+  EXPECT_NE(
+      outcome.error->message.find(
+          "case.toml:11:1: 64 of 64 points of grains.box are farther than max_distance = 0.05 m"),
+      std::string::npos)
       << outcome.error->message;
 }
 
@@ -273,8 +297,10 @@ TEST_F(Loopback, ASurfaceThatIsNotOfferedIsNamedWithTheNearest) {
   text.replace(text.find("structure.inside"), 16, "structure.insde");
   const auto outcome = run(text);
   EXPECT_EQ(outcome.exit_code, io::exit_user_error);
-  EXPECT_NE(outcome.error->message.find("case.toml:13:1: structure has no surface \"insde\". Did you mean \"structure.inside\"?"),
-            std::string::npos)
+  EXPECT_NE(
+      outcome.error->message.find(
+          "case.toml:13:1: structure has no surface \"insde\". Did you mean \"structure.inside\"?"),
+      std::string::npos)
       << outcome.error->message;
 }
 
@@ -283,7 +309,8 @@ TEST_F(Loopback, ReplayGivesTheReceiverTheSameForcesBitForBit) {
   run(case_text(), where);
   const auto first = receiver.got;
   receiver.got.clear();
-  const auto outcome = run(case_text("", "[grains]\nreplay = \"first/interface.h5\"\n[structure]\ncommand = [\"b\"]\n"));
+  const auto outcome = run(
+      case_text("", "[grains]\nreplay = \"first/interface.h5\"\n[structure]\ncommand = [\"b\"]\n"));
   EXPECT_EQ(outcome.status, Status::met) << outcome.error->message;
   ASSERT_EQ(receiver.got.size(), first.size());
   for (std::size_t k = 0; k < first.size(); ++k) EXPECT_EQ(receiver.got[k].force, first[k].force);
@@ -293,7 +320,9 @@ TEST_F(Loopback, ReplayGivesTheReceiverTheSameForcesBitForBit) {
 TEST_F(Loopback, ReplayShiftsPartsAndIsSilentOutside) {
   run(case_text(), results("first"));
   receiver.got.clear();
-  run(case_text("", "[grains]\nreplay = { file = \"first\", from = 0.6, to = 0.8, at = 0.3 }\n[structure]\ncommand = [\"b\"]\n"));
+  run(case_text("",
+                "[grains]\nreplay = { file = \"first\", from = 0.6, to = 0.8, at = 0.3 "
+                "}\n[structure]\ncommand = [\"b\"]\n"));
   ASSERT_EQ(receiver.got.size(), 10u);
   EXPECT_EQ(receiver.got[3].force, mapped(6));
   EXPECT_EQ(receiver.got[4].force, mapped(7));
@@ -309,7 +338,8 @@ TEST_F(Loopback, ReplayInOtherWindowsKeepsTheImpulse) {
   run(text);
   ASSERT_EQ(receiver.got.size(), 4u);
   const auto a = mapped(0), b = mapped(1), c = mapped(2);
-  for (std::size_t p = 0; p < a.size(); ++p)  // a mean of recorded means, to the round-off of the mapping
+  for (std::size_t p = 0; p < a.size();
+       ++p)  // a mean of recorded means, to the round-off of the mapping
     EXPECT_LT((receiver.got[0].force[p] - (0.4 * a[p] + 0.4 * b[p] + 0.2 * c[p])).norm(), 1e-13);
 }
 
@@ -323,15 +353,20 @@ TEST_F(Loopback, ExpectationsReadTheLastWindowOrTheMean) {
 "structure.reaction.z" = {{ value = {:.15g}, relative = 1e-12 }}
 "grains.box.force.z" = {{ value = {:.15g}, absolute = 1e-9, mean_over = 0.2, source = "sum by hand" }}
 "structure.seconds.solve" = {{ value = 0.5, relative = 0 }}
-)", last, -mean);
+)",
+                                  last, -mean);
   auto outcome = run(case_text("", participants_text + expect));
   EXPECT_EQ(outcome.status, Status::met);
   ASSERT_EQ(outcome.expectations.size(), 3u);
   EXPECT_NEAR(*outcome.expectations[0].value, last, 1e-9);
-  outcome = run(case_text("", std::string(participants_text) + "[expect]\n\"structure.reaction.z\" = { value = 1, relative = 0.1 }\n"));
+  outcome = run(
+      case_text("", std::string(participants_text) +
+                        "[expect]\n\"structure.reaction.z\" = { value = 1, relative = 0.1 }\n"));
   EXPECT_EQ(outcome.status, Status::missed);
   EXPECT_EQ(outcome.exit_code, io::exit_missed);
-  outcome = run(case_text("", std::string(participants_text) + "[expect]\n\"structure.reacton.z\" = { value = 1, relative = 0.1 }\n"));
+  outcome =
+      run(case_text("", std::string(participants_text) +
+                            "[expect]\n\"structure.reacton.z\" = { value = 1, relative = 0.1 }\n"));
   EXPECT_EQ(outcome.status, Status::missed);
   EXPECT_FALSE(outcome.expectations[0].value.has_value());
 }
@@ -339,7 +374,8 @@ TEST_F(Loopback, ExpectationsReadTheLastWindowOrTheMean) {
 TEST_F(Loopback, BothSidesWorkAtTheSameTime) {
   sender.pause = receiver.pause = std::chrono::milliseconds(60);
   const auto outcome = run(case_text());
-  // One after the other would take 1.2 s; overlapped it is 0.66 s. The margin is for a busy machine.
+  // One after the other would take 1.2 s; overlapped it is 0.66 s. The margin is for a busy
+  // machine.
   EXPECT_LT(outcome.seconds, 1.05);
 }
 
@@ -356,7 +392,8 @@ TEST_F(Loopback, AnExceptionIsToldWithItsStateAndTheOtherIsDismissed) {
   EXPECT_NE(outcome.error->message.find("the stub was told to fail"), std::string::npos);
   EXPECT_NE(receiver_error.find("the coupler ended the run"), std::string::npos);
   EXPECT_LE(outcome.windows, 4);
-  EXPECT_EQ(io::SeriesReader(where + "/interface.h5").windows(), static_cast<std::size_t>(outcome.windows));
+  EXPECT_EQ(io::SeriesReader(where + "/interface.h5").windows(),
+            static_cast<std::size_t>(outcome.windows));
 }
 
 TEST_F(Loopback, AUsersMistakeInsideASolverTravelsVerbatim) {
@@ -367,9 +404,10 @@ TEST_F(Loopback, AUsersMistakeInsideASolverTravelsVerbatim) {
 }
 
 TEST_F(Loopback, FieldsThatCannotBeUsedAreNamedWithTheirSender) {
-  const std::pair<Mishap::Kind, const char*> cases[] = {{Mishap::Kind::not_finite, "force on box is not finite at point 3"},
-                                                        {Mishap::Kind::forget_force, "did not send force on box"},
-                                                        {Mishap::Kind::wrong_size, "63 values for 64 points"}};
+  const std::pair<Mishap::Kind, const char*> cases[] = {
+      {Mishap::Kind::not_finite, "force on box is not finite at point 3"},
+      {Mishap::Kind::forget_force, "did not send force on box"},
+      {Mishap::Kind::wrong_size, "63 values for 64 points"}};
   for (const auto& [kind, words] : cases) {
     sender.mishap = {1, kind};
     const auto outcome = run(case_text());
@@ -405,16 +443,23 @@ TEST_F(Loopback, StrangersAndGarbageAreAnsweredNotedAndIgnored) {
       socket.connect(endpoint);
       speak(socket);
       const auto parcel = protocol::receive_parcel(socket, std::chrono::milliseconds(2000), false);
-      answers.push_back(parcel ? protocol::read_error(protocol::decode(parcel->frames)).text : "no answer");
+      answers.push_back(parcel ? protocol::read_error(protocol::decode(parcel->frames)).text
+                               : "no answer");
     };
-    ask([](auto& socket) { socket.send(zmq::str_buffer("garbage \xff\x00 bytes"), zmq::send_flags::none); });
-    ask([](auto& socket) { protocol::send(socket, protocol::hello_message("grans", {"dem", 3, {}})); });
+    ask([](auto& socket) {
+      socket.send(zmq::str_buffer("garbage \xff\x00 bytes"), zmq::send_flags::none);
+    });
+    ask([](auto& socket) {
+      protocol::send(socket, protocol::hello_message("grans", {"dem", 3, {}}));
+    });
     ask([](auto& socket) { protocol::send(socket, protocol::done_message()); });
   });
   EXPECT_EQ(outcome.status, Status::met);
   ASSERT_EQ(answers.size(), 3u);
   EXPECT_NE(answers[0].find("this is not the protocol"), std::string::npos) << answers[0];
-  EXPECT_NE(answers[1].find("there is no participant \"grans\" here; there are: grains, structure"), std::string::npos) << answers[1];
+  EXPECT_NE(answers[1].find("there is no participant \"grans\" here; there are: grains, structure"),
+            std::string::npos)
+      << answers[1];
   EXPECT_NE(answers[2].find("done came before hello"), std::string::npos) << answers[2];
   EXPECT_EQ(ear_.notes().size(), 3u);
 }
@@ -422,12 +467,15 @@ TEST_F(Loopback, StrangersAndGarbageAreAnsweredNotedAndIgnored) {
 // A participant by hand, for what serve() would never do.
 class Rogue {
  public:
-  Rogue(zmq::context_t& context, const char* endpoint) : socket_(context, zmq::socket_type::dealer) {
+  Rogue(zmq::context_t& context, const std::string& endpoint)
+      : socket_(context, zmq::socket_type::dealer) {
     socket_.set(zmq::sockopt::linger, 0);
     socket_.connect(endpoint);
   }
   void send(const protocol::Message& message) { protocol::send(socket_, message); }
-  void send_raw(const std::string& bytes) { socket_.send(zmq::buffer(bytes), zmq::send_flags::none); }
+  void send_raw(const std::string& bytes) {
+    socket_.send(zmq::buffer(bytes), zmq::send_flags::none);
+  }
   std::optional<protocol::Message> hear() {
     const auto parcel = protocol::receive_parcel(socket_, std::chrono::milliseconds(3000), false);
     return parcel ? std::optional(protocol::decode(parcel->frames)) : std::nullopt;
@@ -442,6 +490,8 @@ class RogueParticipant : public Loopback {
   // Runs the case with `act` in the place of the sender.
   Outcome run_rogue(const std::string& text, const std::function<void(Rogue&)>& act) {
     const auto read = coupler::read_case(io::Table::from_text(text, "case.toml"));
+    next_endpoint();
+    ear_.close();
     Served b;
     serve(receiver, "structure", b);
     std::thread rogue([&] {
@@ -464,47 +514,58 @@ class RogueParticipant : public Loopback {
 };
 
 TEST_F(RogueParticipant, GarbageOfAKnownPeerFailsTheRunAndNamesIt) {
-  expect_failure(run_rogue(case_text(), [](Rogue& rogue) {
-    rogue.send(hello());
-    rogue.hear();
-    rogue.send_raw("\x81\xa1x");
-    rogue.hear();
-  }), "grains (a) sent something that is not the protocol");
+  expect_failure(run_rogue(case_text(),
+                           [](Rogue& rogue) {
+                             rogue.send(hello());
+                             rogue.hear();
+                             rogue.send_raw("\x81\xa1x");
+                             rogue.hear();
+                           }),
+                 "grains (a) sent something that is not the protocol");
 }
 
 TEST_F(RogueParticipant, AMessageOutOfTurnNamesSenderStateAndMessage) {
-  expect_failure(run_rogue(case_text(), [](Rogue& rogue) {
-    rogue.send(hello());
-    rogue.hear();
-    rogue.send(protocol::done_message());
-    rogue.hear();
-  }), "grains (a) sent done out of turn while starting.");
+  expect_failure(run_rogue(case_text(),
+                           [](Rogue& rogue) {
+                             rogue.send(hello());
+                             rogue.hear();
+                             rogue.send(protocol::done_message());
+                             rogue.hear();
+                           }),
+                 "grains (a) sent done out of turn while starting.");
 }
 
 TEST_F(RogueParticipant, AnAnswerToAnotherRequestIsRefused) {
-  expect_failure(run_rogue(case_text(), [](Rogue& rogue) {
-    rogue.send(hello());
-    rogue.hear();
-    rogue.send(protocol::interface_message({{"box", stubs::square(2, true)}}));
-    auto request = rogue.hear();
-    protocol::Message answer = protocol::advanced_message({});
-    answer.sequence = request->sequence + 5;
-    rogue.send(answer);
-    rogue.hear();
-  }), "answered request 6 while 1 was asked");
+  expect_failure(
+      run_rogue(case_text(),
+                [](Rogue& rogue) {
+                  rogue.send(hello());
+                  rogue.hear();
+                  rogue.send(protocol::interface_message({{"box", stubs::square(2, true)}}));
+                  auto request = rogue.hear();
+                  protocol::Message answer = protocol::advanced_message({});
+                  answer.sequence = request->sequence + 5;
+                  rogue.send(answer);
+                  rogue.hear();
+                }),
+      "answered request 6 while 1 was asked");
 }
 
 TEST_F(RogueParticipant, OtherVersionsAndDimensionsAreRefusedByName) {
-  expect_failure(run_rogue(case_text(), [](Rogue& rogue) {
-    auto message = hello();
-    message.body["versions"] = {2, 3};
-    rogue.send(message);
-    EXPECT_EQ(rogue.hear()->kind, protocol::Kind::error);
-  }), "speaks protocol versions 2 to 3, this coupler speaks 1");
-  expect_failure(run_rogue(case_text(), [](Rogue& rogue) {
-    rogue.send(protocol::hello_message("grains", {"stub", 2, {}}));
-    EXPECT_EQ(rogue.hear()->kind, protocol::Kind::error);
-  }), "works in 2 dimensions, the case has 3");
+  expect_failure(run_rogue(case_text(),
+                           [](Rogue& rogue) {
+                             auto message = hello();
+                             message.body["versions"] = {2, 3};
+                             rogue.send(message);
+                             EXPECT_EQ(rogue.hear()->kind, protocol::Kind::error);
+                           }),
+                 "speaks protocol versions 2 to 3, this coupler speaks 1");
+  expect_failure(run_rogue(case_text(),
+                           [](Rogue& rogue) {
+                             rogue.send(protocol::hello_message("grains", {"stub", 2, {}}));
+                             EXPECT_EQ(rogue.hear()->kind, protocol::Kind::error);
+                           }),
+                 "works in 2 dimensions, the case has 3");
 }
 
 TEST_F(RogueParticipant, APulseThatStopsIsAFreezeWithinTwoSeconds) {
@@ -521,37 +582,47 @@ TEST_F(RogueParticipant, APulseThatStopsIsAFreezeWithinTwoSeconds) {
     ASSERT_TRUE(word.has_value());
     EXPECT_EQ(word->kind, protocol::Kind::error);
   });
-  expect_failure(outcome, "has not answered for 1.5 s: its process is frozen or gone while starting.");
+  expect_failure(outcome,
+                 "has not answered for 1.5 s: its process is frozen or gone while starting.");
 }
 
 TEST_F(RogueParticipant, NobodyComing) {
   const auto begin = std::chrono::steady_clock::now();
-  expect_failure(run_rogue(case_text("start_limit = 0.5"), [](Rogue&) {}), "did not say hello within 0.5 s (coupling.start_limit)");
+  expect_failure(run_rogue(case_text("start_limit = 0.5"), [](Rogue&) {}),
+                 "did not say hello within 0.5 s (coupling.start_limit)");
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
 }
 
 TEST_F(RogueParticipant, NoProgressIsNamedByItsLimit) {
-  const auto outcome = run_rogue(case_text("", "[grains]\ncommand = [\"a\"]\nadvance_limit = 0.5\n[structure]\ncommand = [\"b\"]\n"),
-                                 [&](Rogue& rogue) {
-                                   rogue.send(hello());
-                                   const auto welcome = protocol::read_welcome(*rogue.hear());
-                                   protocol::Pulse pulse(context_, welcome.pulse_endpoint, "grains");
-                                   rogue.hear();
-                                 });
-  expect_failure(outcome, "lives but made no progress for 0.5 s (its advance_limit) while starting.");
+  const auto outcome = run_rogue(
+      case_text(
+          "", "[grains]\ncommand = [\"a\"]\nadvance_limit = 0.5\n[structure]\ncommand = [\"b\"]\n"),
+      [&](Rogue& rogue) {
+        rogue.send(hello());
+        const auto welcome = protocol::read_welcome(*rogue.hear());
+        protocol::Pulse pulse(context_, welcome.pulse_endpoint, "grains");
+        rogue.hear();
+      });
+  expect_failure(outcome,
+                 "lives but made no progress for 0.5 s (its advance_limit) while starting.");
 }
 
 TEST_F(RogueParticipant, ALargeMeshTravelsWhole) {
-  expect_failure(run_rogue(case_text(), [](Rogue& rogue) {
-    rogue.send(hello());
-    rogue.hear();
-    rogue.send(protocol::interface_message({{"box", stubs::square(300, true)}}));  // 90601 points: beyond any header limit
-    const auto request = rogue.hear();
-    auto answer = protocol::error_message("far enough", "advancing");
-    answer.sequence = request->sequence;
-    rogue.send(answer);
-    EXPECT_EQ(protocol::read_advance(*request).start, 0);
-  }), "far enough");
+  expect_failure(
+      run_rogue(
+          case_text(),
+          [](Rogue& rogue) {
+            rogue.send(hello());
+            rogue.hear();
+            rogue.send(protocol::interface_message(
+                {{"box", stubs::square(300, true)}}));  // 90601 points: beyond any header limit
+            const auto request = rogue.hear();
+            auto answer = protocol::error_message("far enough", "advancing");
+            answer.sequence = request->sequence;
+            rogue.send(answer);
+            EXPECT_EQ(protocol::read_advance(*request).start, 0);
+          }),
+      "far enough");
 }
 
 // --- notices of a launcher ---
@@ -575,17 +646,23 @@ TEST(Launcher, NoticesOfExitsAndInterruptsEndTheRun) {
     coupler::Reporter silent;
     const auto read = coupler::read_case(io::Table::from_text(case_text(), "case.toml"));
     Notices notices(interrupt ? coupler::Notice{}
-                              : coupler::Notice{coupler::Notice::Kind::exited, "grains", "was killed by signal 11 (Segmentation fault)", false, ""});
-    const auto outcome = coupler::Coupler(context, read, {"inproc://hub", "", &notices}, silent).run();
+                              : coupler::Notice{coupler::Notice::Kind::exited, "grains",
+                                                "was killed by signal 11 (Segmentation fault)",
+                                                false, ""});
+    const auto outcome =
+        coupler::Coupler(context, read, {"inproc://hub", "", &notices}, silent).run();
     EXPECT_EQ(outcome.status, interrupt ? Status::interrupted : Status::failed);
     EXPECT_EQ(outcome.exit_code, interrupt ? io::exit_interrupted : io::exit_failure);
-    EXPECT_EQ(outcome.error->message, interrupt ? "the run was interrupted"
-                                                : "grains (a) was killed by signal 11 (Segmentation fault) while not connected.");
+    EXPECT_EQ(outcome.error->message,
+              interrupt
+                  ? "the run was interrupted"
+                  : "grains (a) was killed by signal 11 (Segmentation fault) while not connected.");
   }
 }
 
 TEST(Launcher, NoticesSurviveTheirLine) {
-  const coupler::Notice notice{coupler::Notice::Kind::exited, "grains", "was \"killed\"\nby \xff", true, "case.toml:1:2: é"};
+  const coupler::Notice notice{coupler::Notice::Kind::exited, "grains", "was \"killed\"\nby \xff",
+                               true, "case.toml:1:2: é"};
   const auto line = coupler::to_line(notice);
   EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1);
   const auto back = coupler::notice_from_line(line);

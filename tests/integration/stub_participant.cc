@@ -1,4 +1,5 @@
-// A participant for kill_test.py: stub_participant send|receive [--pause MILLISECONDS] [--at WINDOW --do MISHAP] [--never].
+// A participant for kill_test.py: stub_participant send|receive [--pause MILLISECONDS] [--at WINDOW
+// --do MISHAP] [--never].
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -23,10 +24,11 @@ int serve(Stub stub, std::chrono::milliseconds pause, const stubs::Mishap& misha
 }
 
 int run(int argc, char** argv) {
-  const std::map<std::string, stubs::Mishap::Kind> kinds{{"exception", stubs::Mishap::Kind::exception},
-                                                         {"user_error", stubs::Mishap::Kind::user_error},
-                                                         {"hang", stubs::Mishap::Kind::hang},
-                                                         {"die", stubs::Mishap::Kind::die}};
+  const std::map<std::string, stubs::Mishap::Kind> kinds{
+      {"exception", stubs::Mishap::Kind::exception},
+      {"user_error", stubs::Mishap::Kind::user_error},
+      {"hang", stubs::Mishap::Kind::hang},
+      {"die", stubs::Mishap::Kind::die}};
   std::chrono::milliseconds pause{0};
   stubs::Mishap mishap;
   for (int k = 2; k < argc; ++k) {
@@ -38,7 +40,8 @@ int run(int argc, char** argv) {
   }
   std::puts("the stub has started");
   std::fflush(stdout);
-  return std::strcmp(argv[1], "send") == 0 ? serve(stubs::Sender(), pause, mishap) : serve(stubs::Receiver(), pause, mishap);
+  return std::strcmp(argv[1], "send") == 0 ? serve(stubs::Sender(), pause, mishap)
+                                           : serve(stubs::Receiver(), pause, mishap);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// Two small participants with known forces: a sender on a triangulated square, a receiver on a coarser square of quads.
+// Two small participants with known forces: a sender on a triangulated square, a receiver on a
+// coarser square of quads.
 #pragma once
 
 #include <chrono>
@@ -20,7 +21,8 @@ using geometry::Vec3;
 inline geometry::SurfaceMesh square(std::uint32_t n, bool triangles, double z = 0) {
   geometry::SurfaceMesh mesh;
   for (std::uint32_t j = 0; j <= n; ++j)
-    for (std::uint32_t i = 0; i <= n; ++i) mesh.points.emplace_back(double(i) / n, double(j) / n, z);
+    for (std::uint32_t i = 0; i <= n; ++i)
+      mesh.points.emplace_back(double(i) / n, double(j) / n, z);
   const auto at = [&](std::uint32_t i, std::uint32_t j) { return j * (n + 1) + i; };
   for (std::uint32_t j = 0; j < n; ++j)
     for (std::uint32_t i = 0; i < n; ++i) {
@@ -29,8 +31,10 @@ inline geometry::SurfaceMesh square(std::uint32_t n, bool triangles, double z = 
         mesh.add_face(geometry::FaceKind::quad4, quad);
         continue;
       }
-      mesh.add_face(geometry::FaceKind::triangle3, std::vector<std::uint32_t>{quad[0], quad[1], quad[2]});
-      mesh.add_face(geometry::FaceKind::triangle3, std::vector<std::uint32_t>{quad[0], quad[2], quad[3]});
+      mesh.add_face(geometry::FaceKind::triangle3,
+                    std::vector<std::uint32_t>{quad[0], quad[1], quad[2]});
+      mesh.add_face(geometry::FaceKind::triangle3,
+                    std::vector<std::uint32_t>{quad[0], quad[2], quad[3]});
     }
   return mesh;
 }
@@ -44,17 +48,32 @@ inline Vec3 known_force(std::int64_t window, std::size_t point) {
 /// What goes wrong, and when.
 struct Mishap {
   std::int64_t window = -1;  ///< −1: never
-  enum class Kind { none, exception, user_error, hang, die, not_finite, forget_force, wrong_size } kind = Kind::none;
+  enum class Kind {
+    none,
+    exception,
+    user_error,
+    hang,
+    die,
+    not_finite,
+    forget_force,
+    wrong_size
+  } kind = Kind::none;
 };
 
 inline void suffer(const Mishap& mishap, std::int64_t window) {
   if (mishap.window != window) return;
   switch (mishap.kind) {
-    case Mishap::Kind::exception: throw std::runtime_error("the stub was told to fail");
-    case Mishap::Kind::user_error: throw io::UserError({"case.toml", 7, 3}, "stub.key = 3 is wrong. Use 4.");
-    case Mishap::Kind::hang: std::this_thread::sleep_for(std::chrono::hours(1)); break;
-    case Mishap::Kind::die: std::_Exit(7);
-    default: break;
+    case Mishap::Kind::exception:
+      throw std::runtime_error("the stub was told to fail");
+    case Mishap::Kind::user_error:
+      throw io::UserError({"case.toml", 7, 3}, "stub.key = 3 is wrong. Use 4.");
+    case Mishap::Kind::hang:
+      std::this_thread::sleep_for(std::chrono::hours(1));
+      break;
+    case Mishap::Kind::die:
+      std::_Exit(7);
+    default:
+      break;
   }
 }
 
@@ -70,7 +89,8 @@ class Sender : public protocol::Participant {
     surface_ = square(7, true, height);
     return {{"box", surface_}};
   }
-  protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>&) override {
+  protocol::Advance advance(const protocol::Window& window,
+                            const std::vector<protocol::Field>&) override {
     std::this_thread::sleep_for(pause);
     suffer(mishap, window.start);
     protocol::Advance advance;
@@ -80,10 +100,13 @@ class Sender : public protocol::Participant {
       field.values.push_back(known_force(window.start, p));
       sum += field.values.back();
     }
-    if (mishap.window == window.start && mishap.kind == Mishap::Kind::not_finite) field.values[3][1] = std::nan("");
-    if (mishap.window == window.start && mishap.kind == Mishap::Kind::wrong_size) field.values.pop_back();
+    if (mishap.window == window.start && mishap.kind == Mishap::Kind::not_finite)
+      field.values[3][1] = std::nan("");
+    if (mishap.window == window.start && mishap.kind == Mishap::Kind::wrong_size)
+      field.values.pop_back();
     advance.quantities = {{"box.force.z", sum[2]}};
-    if (mishap.window != window.start || mishap.kind != Mishap::Kind::forget_force) advance.fields.push_back(std::move(field));
+    if (mishap.window != window.start || mishap.kind != Mishap::Kind::forget_force)
+      advance.fields.push_back(std::move(field));
     advance.steps = 10;
     return advance;
   }
@@ -110,7 +133,8 @@ class Receiver : public protocol::Participant {
     run_ = run;
     return {{"inside", square(4, false)}};
   }
-  protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override {
+  protocol::Advance advance(const protocol::Window& window,
+                            const std::vector<protocol::Field>& received) override {
     std::this_thread::sleep_for(pause);
     suffer(mishap, window.start);
     Vec3 sum = Vec3::Zero();

@@ -68,7 +68,8 @@ TEST_F(AStructure, CarriesItsWeightAndTheForcesItReceives) {
     largest = std::max(largest, u.norm());
   }
   EXPECT_EQ(advance.fields[0].name, "displacement");
-  EXPECT_LE(largest, found.at("displacement.max"));
+  // The same three squares, added in another order.
+  EXPECT_LE(largest, found.at("displacement.max") * (1 + 1e-15));
   EXPECT_EQ(advance.fields[1].name, "velocity");
   for (const auto& v : advance.fields[1].values) EXPECT_EQ(v.norm(), 0);
 }
