@@ -477,7 +477,7 @@ class Rogue {
     socket_.send(zmq::buffer(bytes), zmq::send_flags::none);
   }
   std::optional<protocol::Message> hear() {
-    const auto parcel = protocol::receive_parcel(socket_, std::chrono::milliseconds(3000), false);
+    const auto parcel = protocol::receive_parcel(socket_, std::chrono::seconds(20), false);
     return parcel ? std::optional(protocol::decode(parcel->frames)) : std::nullopt;
   }
 
@@ -615,7 +615,7 @@ TEST_F(RogueParticipant, ALargeMeshTravelsWhole) {
             rogue.send(hello());
             rogue.hear();
             rogue.send(protocol::interface_message(
-                {{"box", stubs::square(300, true)}}));  // 90601 points: beyond any header limit
+                {{"box", stubs::square(150, true)}}));  // 22801 points: beyond any header limit
             const auto request = rogue.hear();
             auto answer = protocol::error_message("far enough", "advancing");
             answer.sequence = request->sequence;
