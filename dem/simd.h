@@ -1,8 +1,9 @@
-// Four doubles at a time. The only file that knows how: GCC's vector types, which become AVX where the build has it and
-// pairs of SSE2 registers where not. (std::experimental::simd has no gather and no permute.)
+// Packs of doubles. The only file that knows how: GCC's vector types, which become AVX-512, AVX or pairs of SSE2 registers, as the
+// build has them. (std::experimental::simd has no gather and no permute.)
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "dem/particles.h"
 
@@ -15,6 +16,7 @@ namespace acopla::dem {
 struct Mask4 {
   using Vector = long long __attribute__((vector_size(32)));
   Vector v;
+  friend Mask4 operator&(const Mask4& a, const Mask4& b) { return {a.v & b.v}; }
 };
 
 struct Double4 {
@@ -34,6 +36,9 @@ struct Double4 {
   friend Mask4 operator>(const Double4& a, const Double4& b) { return {a.v > b.v}; }
 };
 
+/// Contacts of a pack.
+inline constexpr std::size_t lanes = 4;
+
 /// Lane by lane: where the mask holds `yes`, else `no`. Both are computed.
 inline Double4 select(const Mask4& mask, const Double4& yes, const Double4& no) { return Double4(mask.v ? yes.v : no.v); }
 inline double select(bool mask, double yes, double no) { return mask ? yes : no; }
@@ -49,7 +54,9 @@ inline Double4 sqrt(const Double4& a) {
 #endif
 }
 
-/// Four records as four components: what four pairs need, in four loads and eight shuffles.
+inline double sum(const Double4& a) { return (a.v[0] + a.v[1]) + (a.v[2] + a.v[3]); }
+
+/// Four records as four components: what four contacts need, in four loads and eight shuffles.
 struct Record4 {
   Double4 x, y, z, w;
 };
@@ -65,5 +72,20 @@ inline Record4 transposed(const Double4::Vector& a, const Double4::Vector& b, co
 using RecordVector = double __attribute__((vector_size(32), may_alias));
 inline const RecordVector& as_vector(const Record& record) { return reinterpret_cast<const RecordVector&>(record); }
 inline RecordVector& as_vector(Record& record) { return reinterpret_cast<RecordVector&>(record); }
+
+inline Record4 gathered(const Record* records, const std::uint32_t* four) {
+  return transposed(as_vector(records[four[0]]), as_vector(records[four[1]]), as_vector(records[four[2]]), as_vector(records[four[3]]));
+}
+inline Record4 loaded(const Record* four) { return transposed(as_vector(four[0]), as_vector(four[1]), as_vector(four[2]), as_vector(four[3])); }
+
+/// Lanes from memory; `at` need not be aligned.
+inline Double4 load(const double* at) {
+  using Unaligned = double __attribute__((vector_size(32), aligned(8), may_alias));
+  return Double4(*reinterpret_cast<const Unaligned*>(at));
+}
+inline void store(double* at, const Double4& value) {
+  using Unaligned = double __attribute__((vector_size(32), aligned(8), may_alias));
+  *reinterpret_cast<Unaligned*>(at) = value.v;
+}
 
 }  // namespace acopla::dem

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
+
 #include "dem/contact/kinematics.h"
+#include "dem/contact/pair_properties.h"
 
 namespace acopla::dem {
 
@@ -8,20 +11,28 @@ namespace acopla::dem {
 /// equal and opposite on the two bodies).
 struct ConstantTorque {
   static constexpr const char* name = "constant_torque";
+  static constexpr std::array<Field, 0> fields{};
   struct Parameters {
     double friction;  ///< μ_r
   };
   static Parameters from(const PairProperties& pair) { return {pair.rolling_friction}; }
+  template <class K>
+  struct History {};
+  static constexpr std::array<Stored, 0> stored{};
 
   /// The torque is capped so that it cannot reverse the relative spin within a step. A sphere may touch twelve others,
   /// each capped alone; explicit damping of neighbours that spin against each other is stable while the sum over contacts
   /// of 2 (I*/I) cap stays below 2, so the cap takes an eighth of the spin a step.
   static constexpr double share = 0.125;
 
-  /// @return torque on i [N m]; −torque acts on j
-  template <class Real>
-  static Vector3<Real> torque(const Kinematics<Real>& k, const Real& normal_force, const Parameters& p) {
+  /// @param shear_stiffness  the tangential law's k_t [N/m]; unused here
+  /// @return torque on i [N m]; −torque acts on j. `energy`: what a spring stores [J]
+  template <class K>
+  static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const typename K::Real&, const Parameters& p,
+                                 History<K>&, typename K::Real& energy) {
     using std::min, std::sqrt;
+    using Real = typename K::Real;
+    energy = Real(0);
     const Real spin = sqrt(dot(k.relative_spin, k.relative_spin));
     // As a factor of the relative spin: what the law asks over |ω|, or the cap, whichever is less.
     const Real cap = (share / k.step) * k.reduced_inertia;
@@ -32,8 +43,12 @@ struct ConstantTorque {
 
 struct FreeRolling {
   static constexpr const char* name = "none";
+  static constexpr std::array<Field, 0> fields{};
   struct Parameters {};
   static Parameters from(const PairProperties&) { return {}; }
+  template <class K>
+  struct History {};
+  static constexpr std::array<Stored, 0> stored{};
 };
 
 }  // namespace acopla::dem

@@ -4,55 +4,69 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dem/contact/pair_properties.h"
-#include "dem/contact/vector3.h"
+#include "dem/contact/vector.h"
 #include "dem/simd.h"
 
 namespace acopla::dem {
 
-/// One contact of body i with body j, which is a particle, a plane, or a triangle; or four such contacts, where Real is
-/// Double4. The normal points from j to i, so that a positive normal force pushes i along it. In contact: overlap > 0.
-template <class Real>
+/// One contact of body i with body j, which is a particle, a plane, or an element of a mesh; or a pack of such contacts, where Real
+/// is a pack. The normal points from j to i, so that a positive normal force pushes i along it. In contact: overlap > 0; a law is
+/// also called with overlap 0 for lanes that do not touch, and must stay finite there (its force is thrown away).
+///
+/// In three dimensions slip and spins are vectors. In two they have one component: slip along the tangent (−n_y, n_x), spins about
+/// the axis out of the plane. A law that is written with `+`, `−`, `dot` and `shortened` serves both.
+template <class Real_, int dimension_>
 struct Kinematics {
-  Real overlap;                 ///< r_i + r_j − d, or r − d at a wall [m]
-  Real closing_speed;           ///< > 0 while the bodies approach [m/s]
-  Real reduced_radius;          ///< 1 / (1/r_i + 1/r_j); r_i at a wall [m]
-  Real reduced_mass;            ///< 1 / (1/m_i + 1/m_j); m_i at a wall [kg]
-  Vector3<Real> normal;         ///< unit
-  Vector3<Real> slip;           ///< tangential velocity of i's surface over j's at the contact point [m/s]
-  Vector3<Real> mean_spin;      ///< (ω_i + ω_j) / 2: how the contact frame turns about its normal [rad/s]
-  Vector3<Real> relative_spin;  ///< ω_i − ω_j [rad/s]
-  Real reduced_inertia;         ///< 1 / (1/I_i + 1/I_j); I_i at a wall [kg m²]
-  double step;                  ///< Δt [s]
-};
+  using Real = Real_;
+  static constexpr int dimension = dimension_;
+  static constexpr int turns = dimension == 2 ? 1 : 3;  ///< components of slip and spins
+  using Turn = Vector<Real, turns>;
 
-/// What a spring of friction carries from step to step; four doubles, so that it is stored as one Record.
-template <class Real>
-struct SpringHistory {
-  Vector3<Real> force;  ///< elastic tangential force on i [N]
-  Real stiffness;       ///< of the last step [N/m]
+  Real overlap;                      ///< r_i + r_j − d, or r − d at a wall [m], ≥ 0
+  Real closing_speed;                ///< > 0 while the bodies approach [m/s]
+  Real reduced_radius;               ///< 1 / (1/r_i + 1/r_j); r_i at a wall [m]
+  Real reduced_mass;                 ///< 1 / (1/m_i + 1/m_j); m_i at a wall [kg]
+  Vector<Real, dimension> normal;    ///< unit
+  Turn slip;                         ///< tangential velocity of i's surface over j's at the contact point [m/s]
+  Turn mean_spin;                    ///< (ω_i + ω_j) / 2: how the contact frame turns about its normal [rad/s]
+  Turn relative_spin;                ///< ω_i − ω_j [rad/s]
+  Real reduced_inertia;              ///< 1 / (1/I_i + 1/I_j); I_i at a wall [kg m²]
+  Real rolling_inertia;              ///< 1 / (1/(I_i + m_i r_i²) + 1/(I_j + m_j r_j²)) (Gomes 2014, eq. 2.103); I_i + m_i r_i² at a wall
+  double step;                       ///< Δt [s]
 };
 
 /// Carries a tangential vector of the previous step into the present tangent plane: it turns with the mean spin about
 /// the normal and tilts with the normal. Both small rotations are taken to first order and the length is then restored by
 /// one step of Newton's root, to fourth order in the step's angle. A vector that lay out of the plane by more than 45° is
-/// not stretched back to its length: it is round-off, and would grow with every step.
-template <class Real>
-Vector3<Real> turned_with_frame(const Vector3<Real>& before, const Kinematics<Real>& k) {
-  using std::min;
-  const Real length = dot(before, before);
-  Vector3<Real> after = before + (k.step * dot(k.mean_spin, k.normal)) * cross(k.normal, before);
-  after = after - dot(after, k.normal) * k.normal;
-  const Real kept = dot(after, after);
-  return select(kept > Real(0), 0.5 * (1.0 + min(length / kept, Real(2))), Real(0)) * after;
+/// not stretched back to its length: it is round-off, and would grow with every step. In the plane the tangent turns by itself.
+template <class K>
+typename K::Turn turned_with_frame(const typename K::Turn& before, const K& k) {
+  using Real = typename K::Real;
+  if constexpr (K::dimension == 2) return before;
+  else {
+    using std::min;
+    const Real length = dot(before, before);
+    typename K::Turn after = before + (k.step * dot(k.mean_spin, k.normal)) * cross(k.normal, before);
+    after = after - dot(after, k.normal) * k.normal;
+    const Real kept = dot(after, after);
+    return select(kept > Real(0), 0.5 * (1.0 + min(length / kept, Real(2))), Real(0)) * after;
+  }
 }
 
 /// The vector, or where it is longer than `limit`, as much of it as has that length.
-template <class Real>
-Vector3<Real> shortened(const Vector3<Real>& vector, const Real& limit) {
-  using std::sqrt;
-  const Real square = dot(vector, vector);
-  return select(square > limit * limit, limit / sqrt(square), Real(1)) * vector;
+template <class Real, int size>
+Vector<Real, size> shortened(const Vector<Real, size>& vector, const Real& limit) {
+  using std::sqrt, std::min, std::max;
+  if constexpr (size == 1) return {max(-limit, min(limit, vector.x))};
+  else {
+    const Real square = dot(vector, vector);
+    return select(square > limit * limit, limit / sqrt(square), Real(1)) * vector;
+  }
 }
+
+/// What a law stores from step to step. It decides how the numbers change when the two bodies of a contact change names (the
+/// particles were sorted anew): a force or torque on i is the opposite of that on j, except that in the plane a force is a number along
+/// the tangent, which turns round with the normal.
+enum class Stored { force, torque, scalar };
 
 }  // namespace acopla::dem

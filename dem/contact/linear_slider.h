@@ -1,41 +1,64 @@
 #pragma once
 
-#include "dem/contact/kinematics.h"
+#include <array>
+
+#include "dem/contact/mindlin.h"
 
 namespace acopla::dem {
 
-/// Linear tangential spring with Coulomb's slider; the dashpot acts only while it sticks (Gomes 2014, eq. 2.44–2.56).
+/// Linear tangential spring with Coulomb's slider; the dashpot acts only while it sticks (Gomes 2014, eq. 2.44–2.56). In increments of
+/// the trapezoidal rule, see Mindlin.
 struct LinearSlider {
   static constexpr const char* name = "linear_slider";
-  static constexpr bool has_history = true;
+  static constexpr bool needs_moduli = false;
+  static constexpr std::array fields{Field{"ratio", "", io::positive, 20, "k_n / k_t"}};
   struct Parameters {
-    double ratio;          ///< k_n / k_t
-    double damping_ratio;  ///< the normal law's
+    double inverse_ratio;  ///< k_t / k_n
+    double dashpot;        ///< c_t over sqrt(k_n m*): 2 ζ sqrt(k_t/k_n)
     double friction;       ///< μ
   };
-  static Parameters from(const PairProperties& pair) { return {pair.stiffness_ratio, pair.damping_ratio, pair.friction}; }
+  static Parameters from(const PairProperties& pair) {
+    const double inverse = 1 / pair.tangential_values[0];
+    return {inverse, 2 * pair.damping_ratio * std::sqrt(inverse), pair.friction};
+  }
 
-  template <class Normal, class Real>
-  static Vector3<Real> force(const Kinematics<Real>& k, const Real& normal_force, const Parameters& p,
-                             const typename Normal::Parameters& normal, SpringHistory<Real>& history) {
-    using std::sqrt;
-    const Real stiffness = Normal::stiffness(k, normal) / p.ratio;
-    const Vector3<Real> elastic = turned_with_frame(history.force, k) - (k.step * stiffness) * k.slip;
-    const Real limit = p.friction * normal_force;
-    const auto slides = dot(elastic, elastic) > limit * limit;
-    history.stiffness = stiffness;
-    history.force = shortened(elastic, limit);
-    const Real dashpot = select(slides, Real(0), 2 * p.damping_ratio * sqrt(stiffness * k.reduced_mass));
-    return shortened(history.force - dashpot * k.slip, limit);
+  /// Elastic force on i half an increment ahead [N].
+  template <class K>
+  struct History {
+    typename K::Turn ahead;
+  };
+  static constexpr std::array stored{Stored::force};
+
+  template <class Normal, class K>
+  static typename K::Real stiffness(const K& k, const Parameters& p, const typename Normal::Parameters& normal) {
+    return Normal::stiffness(k, normal) * p.inverse_ratio;
+  }
+  template <class Normal, class K>
+  static typename K::Real dashpot(const K& k, const Parameters& p, const typename Normal::Parameters& normal) {
+    return p.dashpot * Normal::impedance(k, normal);
+  }
+
+  template <class Normal, class K>
+  static typename K::Turn force(const K& k, const typename K::Real& normal_force, const Parameters& p,
+                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& elastic) {
+    const auto half = (0.5 * k.step * stiffness<Normal>(k, p, normal)) * k.slip;
+    const auto trial = turned_with_frame(history.ahead, k) - half;
+    const auto result = Mindlin::held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
+    history.ahead = elastic - half;
+    return result;
   }
 };
 
 /// Smooth bodies: no tangential force, nothing stored.
 struct Frictionless {
   static constexpr const char* name = "none";
-  static constexpr bool has_history = false;
+  static constexpr bool needs_moduli = false;
+  static constexpr std::array<Field, 0> fields{};
   struct Parameters {};
   static Parameters from(const PairProperties&) { return {}; }
+  template <class K>
+  struct History {};
+  static constexpr std::array<Stored, 0> stored{};
 };
 
 }  // namespace acopla::dem

@@ -1,38 +1,73 @@
 #pragma once
 
-#include "dem/contact/kinematics.h"
+#include <array>
+
+#include "dem/contact/hertz.h"
 
 namespace acopla::dem {
 
 /// Mindlin tangential contact in increments, with Coulomb's limit (Nasato 2011, eq. 7–9 as corrected: the printed secant
-/// law creates energy when the overlap changes; Thornton, Cummins & Cleary 2013).
+/// law creates energy when the overlap changes; Thornton, Cummins & Cleary 2013). The increment is the trapezoidal rule over the
+/// step's two slips, of second order: with the slip at the step's end alone the spring would act as a dashpot of k Δt/2.
 struct Mindlin {
   static constexpr const char* name = "mindlin";
-  static constexpr bool has_history = true;
+  static constexpr bool needs_moduli = true;
+  static constexpr std::array<Field, 0> fields{};
   struct Parameters {
     double shear_modulus;  ///< G* = 1 / ((2−ν_i)/G_i + (2−ν_j)/G_j) [Pa]
+    double impedance;      ///< sqrt(S_t/S_n) = sqrt(4 G*/Y*): from the normal impedance to the tangential one
     double damping;        ///< the normal law's 2 sqrt(5/6) β
     double friction;       ///< μ
   };
-  static Parameters from(const PairProperties& pair) { return {pair.shear_modulus, pair.hertz_damping, pair.friction}; }
+  static Parameters from(const PairProperties& pair) {
+    return {pair.shear_modulus, std::sqrt(4 * pair.shear_modulus / pair.modulus), pair.hertz_damping, pair.friction};
+  }
+
+  /// Elastic force on i half an increment ahead [N], and the stiffness of the last step [N/m].
+  template <class K>
+  struct History {
+    typename K::Turn ahead;
+    typename K::Real stiffness;
+  };
+  static constexpr std::array stored{Stored::force, Stored::scalar};
+
+  /// S_t = 8 G* sqrt(R* δ), eq. 8
+  template <class Normal, class K>
+  static typename K::Real stiffness(const K& k, const Parameters& p, const typename Normal::Parameters&) {
+    using std::sqrt;
+    return 8 * p.shear_modulus * sqrt(k.reduced_radius * k.overlap);
+  }
+  template <class Normal, class K>
+  static typename K::Real dashpot(const K& k, const Parameters& p, const typename Normal::Parameters& normal) {
+    return p.damping * p.impedance * Normal::impedance(k, normal);
+  }
 
   /// @param normal_force  [N]
-  /// @return tangential force on i [N]
-  template <class Normal, class Real>
-  static Vector3<Real> force(const Kinematics<Real>& k, const Real& normal_force, const Parameters& p,
-                             const typename Normal::Parameters&, SpringHistory<Real>& history) {
-    using std::sqrt;
-    // S_t = 8 G* sqrt(R* δ), eq. 8
-    const Real stiffness = 8 * p.shear_modulus * sqrt(k.reduced_radius * k.overlap);
+  /// @return tangential force on i [N]; its elastic part is left in `elastic`
+  template <class Normal, class K>
+  static typename K::Turn force(const K& k, const typename K::Real& normal_force, const Parameters& p,
+                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& elastic) {
+    using Real = typename K::Real;
+    const Real present = stiffness<Normal>(k, p, normal);
     // Where the contact unloads, the spring of the lost area gives its force back; without this, energy is created.
-    const Real kept = select(stiffness < history.stiffness, stiffness / history.stiffness, Real(1));
-    const Vector3<Real> elastic = kept * turned_with_frame(history.force, k) - (k.step * stiffness) * k.slip;
-    const Real limit = p.friction * normal_force;
-    const auto slides = dot(elastic, elastic) > limit * limit;
-    history.stiffness = stiffness;
-    history.force = shortened(elastic, limit);  // sliding, the spring keeps what friction can hold
-    const Real dashpot = select(slides, Real(0), p.damping * sqrt(stiffness * k.reduced_mass));
-    return shortened(history.force - dashpot * k.slip, limit);
+    const Real kept = select(present < history.stiffness, present / history.stiffness, Real(1));
+    const auto half = (0.5 * k.step * present) * k.slip;
+    const auto trial = kept * turned_with_frame(history.ahead, k) - half;
+    const auto result = held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
+    history.ahead = elastic - half;
+    history.stiffness = present;
+    return result;
+  }
+
+  /// Coulomb's limit on a spring and its dashpot: where the spring alone reaches μ F_n the contact slides, the spring keeps what
+  /// friction can hold and the dashpot is off (Gomes 2014, eq. 2.49–2.52); else both act together, up to the limit.
+  template <class Turn, class Real>
+  static Turn held_by_friction(const Turn& trial, const Real& limit, const Real& dashpot, const Turn& slip, Turn& elastic) {
+    const auto slides = dot(trial, trial) > limit * limit;
+    const Turn together = trial - select(slides, Real(0), dashpot) * slip;
+    const Turn result = shortened(together, limit);
+    elastic = select(slides, result, trial);
+    return result;
   }
 };
 

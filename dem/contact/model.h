@@ -1,6 +1,7 @@
 // A contact model: one normal, one tangential and one rolling law, fused into one function by the compiler.
 #pragma once
 
+#include <array>
 #include <type_traits>
 
 #include "dem/contact/constant_torque.h"
@@ -11,6 +12,15 @@
 
 namespace acopla::dem {
 
+/// Where the energy of contacts is and where it went, of one contact or summed. Computed only where a scene keeps an energy ledger.
+template <class Real>
+struct ContactEnergy {
+  Real normal = Real(0), tangential = Real(0), rolling = Real(0);  ///< stored in the springs now [J]
+  Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant [W]
+  Real tangential_power = Real(0);    ///< taken from the bodies by tangential forces [W]
+  Real rolling_power = Real(0);       ///< taken from the bodies by rolling torques [W]
+};
+
 template <class NormalLaw, class TangentialLaw, class RollingLaw>
 struct ContactModel {
   using Normal = NormalLaw;
@@ -18,8 +28,7 @@ struct ContactModel {
   using Rolling = RollingLaw;
   static constexpr bool has_friction = !std::is_same_v<Tangential, Frictionless>;
   static constexpr bool has_rolling = !std::is_same_v<Rolling, FreeRolling>;
-  /// Whether a contact carries a SpringHistory from step to step. Where not, none is stored.
-  static constexpr bool has_history = Tangential::has_history;
+  static constexpr bool rotates = has_friction || has_rolling;
 
   struct Parameters {
     typename Normal::Parameters normal;
@@ -30,21 +39,70 @@ struct ContactModel {
     return {Normal::from(pair), Tangential::from(pair), Rolling::from(pair)};
   }
 
-  template <class Real>
+  /// What a contact carries from step to step. Where the laws store nothing, nothing is stored.
+  template <class K>
+  struct History {
+    [[no_unique_address]] typename Tangential::template History<K> tangential;
+    [[no_unique_address]] typename Rolling::template History<K> rolling;
+  };
+  template <class K>
+  static constexpr std::size_t history_size() {
+    std::size_t size = 0;
+    const auto count = [&](Stored stored) { size += stored == Stored::scalar ? 1 : static_cast<std::size_t>(K::turns); };
+    for (const auto stored : Tangential::stored) count(stored);
+    for (const auto stored : Rolling::stored) count(stored);
+    return size;
+  }
+  /// +1 or −1 for every stored number: its factor when the bodies change names.
+  template <class K>
+  static constexpr auto swap_signs() {
+    std::array<double, history_size<K>()> signs{};
+    std::size_t at = 0;
+    const auto add = [&](Stored stored) {
+      const bool flips = stored == Stored::torque || (stored == Stored::force && K::dimension == 3);
+      for (int n = 0; n < (stored == Stored::scalar ? 1 : K::turns); ++n) signs[at++] = flips ? -1.0 : 1.0;
+    };
+    for (const auto stored : Tangential::stored) add(stored);
+    for (const auto stored : Rolling::stored) add(stored);
+    return signs;
+  }
+
+  template <class K>
   struct Response {
-    Vector3<Real> force;   ///< on i [N]
-    Vector3<Real> torque;  ///< rolling torque on i, equal and opposite on j [N m]; set where the model rolls
+    typename K::Real normal;   ///< normal force [N], ≥ 0
+    typename K::Turn shear;    ///< tangential force on i [N]; set where the model has friction
+    typename K::Turn torque;   ///< rolling torque on i, equal and opposite on j [N m]; set where the model rolls
   };
 
-  /// The same function for one contact with anything, and for four contacts of particles at a time.
-  template <class Real>
-  static Response<Real> respond(const Kinematics<Real>& k, const Parameters& p, SpringHistory<Real>& history) {
-    Response<Real> response;
-    const Real normal_force = Normal::force(k, p.normal);
-    response.force = normal_force * k.normal;
-    if constexpr (has_friction)
-      response.force = response.force + Tangential::template force<Normal>(k, normal_force, p.tangential, p.normal, history);
-    if constexpr (has_rolling) response.torque = Rolling::torque(k, normal_force, p.rolling);
+  /// The same function for particles, planes, triangles, edges and vertices. @param energy  filled unless it is null
+  template <class K>
+  static Response<K> respond(const K& k, const Parameters& p, History<K>& history, ContactEnergy<typename K::Real>* energy) {
+    using Real = typename K::Real;
+    const auto touches = k.overlap > Real(0);
+    Response<K> response;
+    response.normal = select(touches, Normal::force(k, p.normal), Real(0));
+    if (energy) {
+      energy->normal = Normal::energy(k, p.normal);
+      energy->normal_dashpot = select(touches, (response.normal - Normal::elastic_force(k, p.normal)) * k.closing_speed, Real(0));
+    }
+    Real shear_stiffness(0);
+    if constexpr (has_friction) {
+      typename K::Turn elastic;
+      shear_stiffness = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
+      response.shear = Tangential::template force<Normal>(k, response.normal, p.tangential, p.normal, history.tangential, elastic);
+      if (energy) {
+        energy->tangential = select(shear_stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear_stiffness), Real(0));
+        energy->tangential_power = -dot(response.shear, k.slip);
+      }
+    }
+    if constexpr (has_rolling) {
+      Real stored;
+      response.torque = Rolling::torque(k, response.normal, shear_stiffness, p.rolling, history.rolling, stored);
+      if (energy) {
+        energy->rolling = stored;
+        energy->rolling_power = -dot(response.torque, k.relative_spin);
+      }
+    }
     return response;
   }
 };
