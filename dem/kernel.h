@@ -28,12 +28,14 @@ struct PairContacts {
   std::size_t first_export = 0;
 };
 
-/// Contacts of particles with walls of one material, of one partition. Filled by the wall's geometry before the kernel, read by it after.
+/// Contacts of one partition's particles of one material with walls of one material. Filled by
+/// the walls' geometry before the kernel and read by it after; padded to whole packs like PairContacts.
 struct WallContacts {
   std::vector<std::uint32_t> particle;
   std::vector<Record> normal;     ///< unit, from the wall to the particle; w: overlap [m]
   std::vector<Record> velocity;   ///< of the wall at the contact point [m/s]; w: weight in (0, 1] of the contact (crease sharing)
   std::vector<Record> wall_spin;  ///< angular velocity of the wall [rad/s]; empty where all walls of the scene stand or translate
+  std::vector<double> curvature;  ///< 1/radius of the wall's surface [1/m]; empty where no wall of the scene is glued particles
   std::vector<HistoryLane> history;
   std::size_t size = 0;
   std::vector<Record> force;   ///< out: on the particle, weighted [N]

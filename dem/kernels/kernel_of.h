@@ -249,6 +249,7 @@ class KernelOf final : public Kernel {
       }
       k.overlap = max(Double4(0.0), normal.w);
       k.reduced_radius = a.position.w;
+      if (!contacts.curvature.empty()) k.reduced_radius = a.position.w / (1.0 + a.position.w * load(&contacts.curvature[c]));
       k.reduced_mass = a.velocity.w;
       const Double4 along = dot(relative, k.normal);
       k.closing_speed = -along;
