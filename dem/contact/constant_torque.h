@@ -18,6 +18,7 @@ struct ConstantTorque {
   static Parameters from(const PairProperties& pair) { return {pair.rolling_friction}; }
   template <class K>
   struct History {};
+  template <int>
   static constexpr std::array<Stored, 0> stored{};
 
   /// The torque is capped so that it cannot reverse the relative spin within a step. A sphere may touch twelve others,
@@ -48,6 +49,7 @@ struct FreeRolling {
   static Parameters from(const PairProperties&) { return {}; }
   template <class K>
   struct History {};
+  template <int>
   static constexpr std::array<Stored, 0> stored{};
 };
 

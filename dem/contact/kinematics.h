@@ -53,6 +53,16 @@ typename K::Turn turned_with_frame(const typename K::Turn& before, const K& k) {
   }
 }
 
+/// Component by component, lane by lane.
+template <class Mask, class Real>
+Vector<Real, 1> select(const Mask& mask, const Vector<Real, 1>& yes, const Vector<Real, 1>& no) {
+  return {select(mask, yes.x, no.x)};
+}
+template <class Mask, class Real>
+Vector<Real, 3> select(const Mask& mask, const Vector<Real, 3>& yes, const Vector<Real, 3>& no) {
+  return {select(mask, yes.x, no.x), select(mask, yes.y, no.y), select(mask, yes.z, no.z)};
+}
+
 /// The vector, or where it is longer than `limit`, as much of it as has that length.
 template <class Real, int size>
 Vector<Real, size> shortened(const Vector<Real, size>& vector, const Real& limit) {

@@ -2,7 +2,8 @@
 
 #include <array>
 
-#include "dem/contact/mindlin.h"
+#include "dem/contact/linear.h"
+#include "dem/contact/slider.h"
 
 namespace acopla::dem {
 
@@ -27,6 +28,7 @@ struct LinearSlider {
   struct History {
     typename K::Turn ahead;
   };
+  template <int>
   static constexpr std::array stored{Stored::force};
 
   template <class Normal, class K>
@@ -43,7 +45,7 @@ struct LinearSlider {
                                 const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& elastic) {
     const auto half = (0.5 * k.step * stiffness<Normal>(k, p, normal)) * k.slip;
     const auto trial = turned_with_frame(history.ahead, k) - half;
-    const auto result = Mindlin::held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
+    const auto result = held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
     history.ahead = elastic - half;
     return result;
   }
@@ -58,6 +60,7 @@ struct Frictionless {
   static Parameters from(const PairProperties&) { return {}; }
   template <class K>
   struct History {};
+  template <int>
   static constexpr std::array<Stored, 0> stored{};
 };
 

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "dem/contact/hertz.h"
+#include "dem/contact/slider.h"
 
 namespace acopla::dem {
 
@@ -29,6 +30,7 @@ struct Mindlin {
     typename K::Turn ahead;
     typename K::Real stiffness;
   };
+  template <int>
   static constexpr std::array stored{Stored::force, Stored::scalar};
 
   /// S_t = 8 G* sqrt(R* δ), eq. 8
@@ -56,17 +58,6 @@ struct Mindlin {
     const auto result = held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
     history.ahead = elastic - half;
     history.stiffness = present;
-    return result;
-  }
-
-  /// Coulomb's limit on a spring and its dashpot: where the spring alone reaches μ F_n the contact slides, the spring keeps what
-  /// friction can hold and the dashpot is off (Gomes 2014, eq. 2.49–2.52); else both act together, up to the limit.
-  template <class Turn, class Real>
-  static Turn held_by_friction(const Turn& trial, const Real& limit, const Real& dashpot, const Turn& slip, Turn& elastic) {
-    const auto slides = dot(trial, trial) > limit * limit;
-    const Turn together = trial - select(slides, Real(0), dashpot) * slip;
-    const Turn result = shortened(together, limit);
-    elastic = select(slides, result, trial);
     return result;
   }
 };

@@ -19,6 +19,15 @@ struct ContactEnergy {
   Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant [W]
   Real tangential_power = Real(0);    ///< taken from the bodies by tangential forces [W]
   Real rolling_power = Real(0);       ///< taken from the bodies by rolling torques [W]
+
+  void add(const ContactEnergy& other) {
+    normal += other.normal;
+    tangential += other.tangential;
+    rolling += other.rolling;
+    normal_dashpot += other.normal_dashpot;
+    tangential_power += other.tangential_power;
+    rolling_power += other.rolling_power;
+  }
 };
 
 template <class NormalLaw, class TangentialLaw, class RollingLaw>
@@ -49,8 +58,8 @@ struct ContactModel {
   static constexpr std::size_t history_size() {
     std::size_t size = 0;
     const auto count = [&](Stored stored) { size += stored == Stored::scalar ? 1 : static_cast<std::size_t>(K::turns); };
-    for (const auto stored : Tangential::stored) count(stored);
-    for (const auto stored : Rolling::stored) count(stored);
+    for (const auto stored : Tangential::template stored<K::dimension>) count(stored);
+    for (const auto stored : Rolling::template stored<K::dimension>) count(stored);
     return size;
   }
   /// +1 or −1 for every stored number: its factor when the bodies change names.
@@ -62,8 +71,8 @@ struct ContactModel {
       const bool flips = stored == Stored::torque || (stored == Stored::force && K::dimension == 3);
       for (int n = 0; n < (stored == Stored::scalar ? 1 : K::turns); ++n) signs[at++] = flips ? -1.0 : 1.0;
     };
-    for (const auto stored : Tangential::stored) add(stored);
-    for (const auto stored : Rolling::stored) add(stored);
+    for (const auto stored : Tangential::template stored<K::dimension>) add(stored);
+    for (const auto stored : Rolling::template stored<K::dimension>) add(stored);
     return signs;
   }
 
@@ -98,6 +107,7 @@ struct ContactModel {
     if constexpr (has_rolling) {
       Real stored;
       response.torque = Rolling::torque(k, response.normal, shear_stiffness, p.rolling, history.rolling, stored);
+      response.torque = select(touches, response.torque, zero_vector<Real, K::turns>());
       if (energy) {
         energy->rolling = stored;
         energy->rolling_power = -dot(response.torque, k.relative_spin);
