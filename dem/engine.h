@@ -142,7 +142,7 @@ class Engine {
         if (overlap > 0) action(i, j, overlap);
       });
   }
-  [[noreturn]] void stop_at_fastest(double step) const;
+  void stop_at_fastest(double step) const;
   void check_domain() const;
   void check_energy(double step);
 
