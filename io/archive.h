@@ -166,7 +166,8 @@ inline constexpr Element element_of = archive::element_of_type<T>();
 ///   template <class Archive> void state(Archive& a) { a("position", position_); a("rebuilds", rebuilds_); ... }
 /// and `Archive::reading` tells where more is to be done after restoring. Bits are kept exactly. Taken are:
 ///   numbers, bool, enums, std::string, fixed-size Eigen matrices      one array
-///   structures that can be copied byte by byte, without state()       one array of records (padding is saved as it is)
+///   structures of these that can be copied byte by byte               one array of records (padding is saved as it is, and no
+///                                                                     compiler tells a pointer inside: those need state())
 ///   std::span of these                                                one array, whose size must be the same on restoring
 ///   std::vector of these, std::vector<bool>                           one array
 ///   std::vector of std::vector of these, or of std::string            NAME.sizes, and NAME with the rows end to end

@@ -168,11 +168,8 @@ Handle stored_type(const State::Entry& entry) {
       H5Tenum_insert(type.get(), "TRUE", &value);
       return type;
     }
-    case Kind::record: {
-      Handle type(H5Tcreate(H5T_OPAQUE, entry.element.component_bytes), H5Tclose);
-      H5Tset_tag(type.get(), "record");
-      return type;
-    }
+    case Kind::record:
+      return {H5Tcreate(H5T_OPAQUE, entry.element.component_bytes), H5Tclose};
     default:
       return {H5Tcopy(number_type(entry.element)), H5Tclose};
   }
