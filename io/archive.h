@@ -165,14 +165,15 @@ inline constexpr Element element_of = archive::element_of_type<T>();
 /// What both archives share: which types there are, and which arrays each becomes. A type describes itself once,
 ///   template <class Archive> void state(Archive& a) { a("position", position_); a("rebuilds", rebuilds_); ... }
 /// and `Archive::reading` tells where more is to be done after restoring. Bits are kept exactly. Taken are:
-///   numbers, bool, enums, std::string, fixed-size Eigen matrices      one array
+///   numbers, bool, enums, std::string, fixed-size Eigen matrices,
+///   std::array of what is copied byte by byte                         one array
 ///   structures of these that can be copied byte by byte               one array of records (padding is saved as it is, and no
 ///                                                                     compiler tells a pointer inside: those need state())
 ///   std::span of these                                                one array, whose size must be the same on restoring
 ///   std::vector of these, std::vector<bool>                           one array
 ///   std::vector of std::vector of these, or of std::string            NAME.sizes, and NAME with the rows end to end
 ///   std::vector of pairs of these                                     NAME.first, NAME.second
-///   objects with state(Archive&), pairs, std::array                   NAME.MEMBER, NAME.first and NAME.second, NAME[k]
+///   objects with state(Archive&), pairs, other std::array             NAME.MEMBER, NAME.first and NAME.second, NAME[k]
 ///   std::vector of anything else above                                NAME.size and NAME[k]: for few, not for particles
 template <class Self>
 class Archive {
