@@ -7,7 +7,7 @@
 namespace acopla::dem {
 namespace {
 
-using Four = Double4::Vector;
+using Four = RecordVector;
 
 Four absolute(const Four& v) { return v < 0 ? -v : v; }
 

@@ -167,8 +167,8 @@ void expect_four_lanes_to_be_four_contacts() {
   const auto p = Model::from(pair);
   Kinematics<double> one[4];
   SpringHistory<double> history[4];
-  Kinematics<Double4> all{};
-  SpringHistory<Double4> histories{};
+  Kinematics<DoublePack> all{};
+  SpringHistory<DoublePack> histories{};
   for (int lane = 0; lane < 4; ++lane) {
     auto& k = one[lane];
     k = contact(1e-4 * (lane + 1), lane == 3 ? Vector(0, 0, 0) : Vector(0.1 * lane, 1e-3, 0));
@@ -176,8 +176,8 @@ void expect_four_lanes_to_be_four_contacts() {
     k.mean_spin = Vector(1, lane, 2);
     k.relative_spin = lane == 3 ? Vector(0, 0, 0) : Vector(lane, 1, 0);
     history[lane] = {lane == 3 ? Vector(0, 0, 0) : Vector(0.01 * lane, -0.02, 0), lane == 1 ? 1e6 : 0.0};
-    const auto put = [lane](Double4& to, double value) { to.v[lane] = value; };
-    const auto put3 = [&](Vector3<Double4>& to, const Vector& value) {
+    const auto put = [lane](DoublePack& to, double value) { to.v[lane] = value; };
+    const auto put3 = [&](Vector3<DoublePack>& to, const Vector& value) {
       put(to.x, value.x);
       put(to.y, value.y);
       put(to.z, value.z);
@@ -199,7 +199,7 @@ void expect_four_lanes_to_be_four_contacts() {
   for (int lane = 0; lane < 4; ++lane) {
     const auto alone = Model::respond(one[lane], p, history[lane]);
     // The same operations in the same order, up to fused multiply-adds.
-    const auto near = [lane](const Vector3<Double4>& a, const Vector& b) {
+    const auto near = [lane](const Vector3<DoublePack>& a, const Vector& b) {
       EXPECT_NEAR((Vec3(a.x[lane], a.y[lane], a.z[lane]) - b.vector()).norm(), 0, 1e-13 * (1 + b.vector().norm())) << lane;
     };
     near(together.force, alone.force);
