@@ -68,8 +68,6 @@ class Motion {
   Placement at(double time) const;
 
  private:
-  double scaled(double time, double& rate) const;  // of a path
-
   Kind kind_ = Kind::fixed;
   bool turns_ = false, smooth_ = false;
   Vec3 centre_ = Vec3::Zero(), axis_ = Vec3::UnitZ();
