@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cassert>
+#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -29,6 +29,8 @@ double number(const std::vector<HistoryLane>& history, std::size_t numbers, std:
       "contact is too soft for this load: raise the particles' stiffness or lower the speed.",
       particles.id[i], walls.walls()[walls.wall_of(element)].name, time, x[0], x[1], x[2]));
 }
+
+Record record_of(const Vec3& vector) { return {vector[0], vector[1], vector[2], 0}; }
 
 // A centre this near to a surface, over the radius, has gone through it.
 constexpr double least_distance = 0.05;
@@ -97,6 +99,21 @@ bool WallContactList::find_lone(const WallSet& walls, const Record& position, do
   return true;
 }
 
+void WallContactList::sort_by_wall(const WallSet& walls, Group& group) {
+  std::vector<std::uint32_t> order(group.lone.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t k, std::uint32_t l) {
+    const auto &a = group.lone[k], &b = group.lone[l];
+    return std::tuple(walls.wall_of(a.element), a.particle, a.element) < std::tuple(walls.wall_of(b.element), b.particle, b.element);
+  });
+  const auto lone = group.lone;
+  const auto flats = group.flats;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    group.lone[k] = lone[order[k]];
+    group.flats[k] = flats[order[k]];
+  }
+}
+
 void WallContactList::find(const KernelTable& kernels, const WallSet& walls, const Particles& particles, std::uint32_t first, std::uint32_t last,
                            double skin) {
   materials_ = kernels.materials;
@@ -132,7 +149,9 @@ void WallContactList::find(const KernelTable& kernels, const WallSet& walls, con
           const Record now = walls.to_world(walls.wall_of(element), flat);
           if (now.vector().dot(position.vector()) < now.w) flat = {-flat.x, -flat.y, -flat.z, -flat.w};
         }
-        group(element).lone.push_back({flat, i, element});
+        auto& chosen = group(element);
+        chosen.lone.push_back({i, element});
+        chosen.flats.push_back(flat);
       }
       continue;
     }
@@ -144,9 +163,7 @@ void WallContactList::find(const KernelTable& kernels, const WallSet& walls, con
   for (auto& group : groups_) {
     group.turns = group.turns && group.moves;
     // Wall by wall, so that loads are summed in registers.
-    std::sort(group.lone.begin(), group.lone.end(), [&](const Lone& a, const Lone& b) {
-      return std::tuple(walls.wall_of(a.element), a.particle, a.element) < std::tuple(walls.wall_of(b.element), b.particle, b.element);
-    });
+    sort_by_wall(walls, group);
     std::sort(group.balls.begin(), group.balls.end(),
               [](const Near& a, const Near& b) { return std::pair(a.particle, a.element) < std::pair(b.particle, b.element); });
     const auto size = (group.capacity() + lanes) / lanes * lanes;  // one spare at least: contacts are written before it is known that they are any
@@ -198,10 +215,10 @@ void WallContactList::restore(const WallSet& walls, const Particles& particles, 
     return nothing;
   };
   // Where a particle has just left an element for the inside of another, see inherit().
-  const auto left_behind = [&](const Lone& lone) {
+  const auto left_behind = [&](const Near& lone, const Record& body_flat) {
     const auto [first, last] = of_particle(particles.id[lone.particle]);
     const auto wall = walls.wall_of(lone.element);
-    const Record flat = walls.to_world(wall, lone.flat);
+    const Record flat = walls.to_world(wall, body_flat);
     const auto& position = particles.position[lone.particle];
     const Vec3 foot = position.vector() - (flat.vector().dot(position.vector()) - flat.w) * flat.vector();
     for (auto s = first; s < last; ++s)
@@ -217,7 +234,7 @@ void WallContactList::restore(const WallSet& walls, const Particles& particles, 
     std::vector<std::size_t> origin(group.lone.size());
     for (std::size_t k = 0; k < group.lone.size(); ++k) origin[k] = same(group.lone[k].particle, group.lone[k].element);
     for (std::size_t k = 0; k < group.lone.size(); ++k)
-      if (origin[k] == nothing) origin[k] = left_behind(group.lone[k]);
+      if (origin[k] == nothing) origin[k] = left_behind(group.lone[k], group.flats[k]);
     std::size_t c = 0;
     const auto add = [&](std::size_t key, std::uint32_t particle, std::size_t s) {
       if (s == nothing || saved.contacts[s].size != group.numbers) return false;
@@ -237,7 +254,7 @@ void WallContactList::restore(const WallSet& walls, const Particles& particles, 
           if (walls.walls()[walls.wall_of(elements_[e])].material != group.wall_material) continue;
           const auto s = same(near_[f], elements_[e]);
           if (add(group.first_ruled_key() + e, near_[f], s))
-            group.detail[c - 1 - group.first_ruled] = {saved.contacts[s].point, saved.contacts[s].normal, {}, elements_[e], f};
+            group.detail[c - 1 - group.first_ruled] = {record_of(saved.contacts[s].point), record_of(saved.contacts[s].normal), {}, elements_[e], f};
         }
     group.contacts.size = c;
   }
@@ -272,7 +289,7 @@ void WallContactList::touch_lone(Group& group, const WallSet& walls, const Parti
   for (std::size_t k = 0; k < group.lone.size(); ++k) {
     const auto& lone = group.lone[k];
     const auto& x = position[lone.particle];
-    Record flat = lone.flat;
+    Record flat = group.flats[k];
     Vec3 velocity = Vec3::Zero();
     if (group.moves) {
       const auto wall = walls.wall_of(lone.element);
@@ -294,8 +311,9 @@ void WallContactList::touch_lone(Group& group, const WallSet& walls, const Parti
   }
   contacts.size = count;
   if (!through) return;
-  for (const auto& lone : group.lone) {
-    const auto flat = walls.to_world(walls.wall_of(lone.element), lone.flat);
+  for (std::size_t k = 0; k < group.lone.size(); ++k) {
+    const auto& lone = group.lone[k];
+    const auto flat = walls.to_world(walls.wall_of(lone.element), group.flats[k]);
     const auto& x = position[lone.particle];
     if (!(flat.x * x.x + flat.y * x.y + flat.z * x.z - flat.w > least_distance * x.w)) stop_at_wall(walls, particles, lone.particle, lone.element, time);
   }
@@ -357,7 +375,7 @@ void WallContactList::add_by_rules(const WallSet& walls, std::uint8_t particle_m
   contacts.velocity[c].w = weight;
   if (group.turns) contacts.wall_spin[c].set(walls.spin_of(contact.element));
   if (group.curved) contacts.curvature[c] = 0;
-  group.detail[c - group.first_ruled] = {contact.point, contact.normal, contact.weights, contact.element, near};
+  group.detail[c - group.first_ruled] = {record_of(contact.point), record_of(contact.normal), contact.weights, contact.element, near};
 }
 
 // Spare lanes repeat the last contact. Histories stay where they are while the contacts are the same.
@@ -420,8 +438,8 @@ void WallContactList::inherit(Group& group, const WallSet& walls, double radius,
     double nearest = radius * radius;
     for (auto b = first_before; b < last_before; ++b) {
       const auto &mine = detail(c), &left = detail_before(b);
-      const double square = (left.point - mine.point).squaredNorm();
-      if (!used_[b - first_before] && square < nearest && left.normal.dot(mine.normal) > 0.5 &&
+      const double square = (left.point.vector() - mine.point.vector()).squaredNorm();
+      if (!used_[b - first_before] && square < nearest && left.normal.vector().dot(mine.normal.vector()) > 0.5 &&
           walls.wall_of(left.element) == walls.wall_of(mine.element)) {
         nearest = square;
         origin_[c] = b;
@@ -433,7 +451,7 @@ void WallContactList::inherit(Group& group, const WallSet& walls, double radius,
   }
   const auto nearest_point = [&](std::size_t c) {
     NearestPoint contact;
-    contact.normal = detail(c).normal;
+    contact.normal = detail(c).normal.vector();
     contact.distance = radius - group.contacts.normal[c].w;
     return contact;
   };

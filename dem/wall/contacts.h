@@ -8,19 +8,12 @@
 #include <span>
 #include <vector>
 
-#include "dem/kernel.h"
+#include "dem/kernel_table.h"
 #include "dem/wall/load.h"
 #include "dem/wall/touching.h"
 #include "dem/wall/wall_set.h"
 
 namespace acopla::dem {
-
-/// The contact models of a scene, [particle's material · materials + wall's material].
-struct KernelTable {
-  const Kernel* const* kernels = nullptr;
-  std::size_t materials = 0;
-  const Kernel& of(std::size_t i, std::size_t j) const { return *kernels[i * materials + j]; }
-};
 
 /// Histories by the name of their particle, while particles are sorted anew.
 struct SavedWallHistories {
@@ -76,25 +69,17 @@ class WallContactList {
     archive("elements", elements_);
     archive("place", place_);
     archive("materials", materials_);
-    std::size_t count = groups_.size();
-    archive("groups", count);
-    groups_.resize(count);
-    for (auto& group : groups_) group.state(archive);
+    archive("groups", groups_);
     archive("resultants", resultants_);
   }
 
  private:
-  // A particle over the inside of a plane or facet.
-  struct Lone {
-    Record flat;  // normal on the particle's side, and normal · x on it; in body axes
-    std::uint32_t particle, element;
-  };
   struct Near {
     std::uint32_t particle, element;
   };
   // What a contact by the rules leaves for the next step and for the loads.
   struct Detail {
-    Vec3 point, normal;
+    Record point, normal;
     std::array<double, 3> weights;
     std::uint32_t element, near;  // near: place in near_
   };
@@ -104,7 +89,8 @@ class WallContactList {
     std::uint8_t particle_material = 0, wall_material = 0;
     bool moves = false, turns = false, curved = false;  // some wall of its candidates
     std::size_t numbers = 0;                            // a history has
-    std::vector<Lone> lone;
+    std::vector<Near> lone;     // particles over the inside of a plane or facet
+    std::vector<Record> flats;  // of each: normal on the particle's side, and normal · x on it; in body axes
     std::vector<Near> balls;
     std::size_t ruled = 0;  // candidates by the rules
     WallContacts contacts;
@@ -129,6 +115,7 @@ class WallContactList {
       archive("curved", curved);
       archive("numbers", numbers);
       archive("lone", lone);
+      archive("flats", flats);
       archive("balls", balls);
       archive("ruled", ruled);
       archive("particle", contacts.particle);
@@ -149,7 +136,8 @@ class WallContactList {
 
   Group& group_of(const KernelTable& kernels, const WallSet& walls, std::uint8_t particle_material, std::uint8_t wall_material);
   bool find_lone(const WallSet& walls, const Record& position, double travel, std::span<const std::uint32_t> elements);
-  void start_step(Group& group);
+  static void sort_by_wall(const WallSet& walls, Group& group);
+  static void start_step(Group& group);
   void touch_lone(Group& group, const WallSet& walls, const Particles& particles, double time);
   void touch_balls(Group& group, const WallSet& walls, const Particles& particles, double time);
   void touch_by_rules(const WallSet& walls, const Particles& particles, double time);

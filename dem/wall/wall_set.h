@@ -144,16 +144,8 @@ class WallSet {
     archive("time", time_);
     archive("servos", servos_);
     archive("marks", marks_);
-    for (auto& motion : prescribed_) {
-      archive("position", motion.position);
-      archive("velocity", motion.velocity);
-      archive("marked", motion.marked);
-      archive("start", motion.start);
-      archive("fastest", motion.fastest);
-      archive("travel", motion.travel);
-      archive("travel_time", motion.travel_time);
-    }
-    restore();
+    archive("prescribed", prescribed_);
+    if constexpr (Archive::reading) restore();
   }
 
   // What the contact lists need to know of elements.
@@ -222,11 +214,29 @@ class WallSet {
   struct Mark {
     Vec3 displacement = Vec3::Zero();
     double angle = 0, reach = 0;  // reach: farthest point from the axis that matters [m]
+
+    template <class Archive>
+    void state(Archive& archive) {
+      archive("displacement", displacement);
+      archive("angle", angle);
+      archive("reach", reach);
+    }
   };
   struct Prescribed {
     std::vector<Vec3> position, velocity, marked;  // at `start`; at the last mark
     double start = 0, fastest = 0;                 // largest |velocity|
     double travel = 0, travel_time = 0;            // largest distance from `marked` at that time
+
+    template <class Archive>
+    void state(Archive& archive) {
+      archive("position", position);
+      archive("velocity", velocity);
+      archive("marked", marked);
+      archive("start", start);
+      archive("fastest", fastest);
+      archive("travel", travel);
+      archive("travel_time", travel_time);
+    }
   };
 
   std::size_t ball_index(std::uint32_t element) const { return element - facets_.size() - planes_.size(); }
