@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -24,7 +25,7 @@ double measure_particle_step(const Scene& scene, double step) {
   const auto along = [&](Eigen::Index d) { return std::max(1, static_cast<int>((first.high[d] - first.low[d]) / spacing)); };
   const Eigen::Index side = (up + 1) % 3, other = (up + 2) % 3;
   Particles particles;
-  particles.rotates = rotates(scene.laws);
+  particles.kind = scene.kind();
   const auto count = std::min<std::size_t>(20000, scene.particle_count());
   for (int layer = 0; particles.size() < count; ++layer)
     for (int j = 0; j < along(other) && particles.size() < count; ++j)
@@ -46,12 +47,18 @@ double measure_particle_step(const Scene& scene, double step) {
 
 std::string left_out(const Scene& scene, std::size_t meshes, std::size_t planes) {
   std::vector<std::string> out;
-  if (scene.laws.tangential == "none") out.emplace_back("friction and its history");
-  if (scene.laws.rolling == "none") out.emplace_back("rolling resistance");
-  if (!rotates(scene.laws)) out.emplace_back("rotation");
+  const auto sets = scene.law_sets();
+  const auto all = [&](auto&& without) { return std::all_of(sets.begin(), sets.end(), without); };
+  if (all([](const LawSet& set) { return set.tangential == "none"; })) out.emplace_back("friction and its history");
+  if (all([](const LawSet& set) { return set.rolling == "none"; })) out.emplace_back("rolling resistance");
+  if (!scene.rotates()) out.emplace_back("rotation");
   if (meshes == 0) out.emplace_back("triangle walls");
   if (planes == 0) out.emplace_back("planes");
-  out.insert(out.end(), {"bonds", "moving walls", "global damping", "checkpoints"});
+  if (std::none_of(scene.walls.begin(), scene.walls.end(), [](const Wall& wall) { return wall.motion.moves(); })) out.emplace_back("moving walls");
+  if (scene.damping.none()) out.emplace_back("damping beyond the contacts");
+  if (!scene.keeps_ledger) out.emplace_back("energy ledger");
+  if (scene.threads == 1) out.emplace_back("threads");
+  out.emplace_back("bonds");
   return fmt::format("{}", fmt::join(out, ", "));
 }
 
@@ -74,14 +81,14 @@ std::string explain(const io::Table& root, const std::string& name) {
     triangles += wall.mesh.triangles.size();
   }
   Particles none;
-  none.rotates = rotates(scene.laws);
+  none.kind = scene.kind();
   const auto costs = make_engine(scene, none)->costs();
   const double seconds = measure_particle_step(scene, step) * count * steps;
 
   std::string text;
   const auto line = [&](const char* what, const std::string& value) { text += fmt::format("  {:22} {}\n", what, value); };
-  line("particles", fmt::format("{} spheres", scene.particle_count()));
-  line("laws", scene.laws.text());
+  line("particles", fmt::format("{} {}", scene.particle_count(), scene.dimension == 2 ? "discs" : "spheres"));
+  for (const auto& set : scene.law_sets()) line("laws", set.text());
   line("walls", fmt::format("{} mesh(es) of {} triangles, {} plane(s)", meshes, triangles, planes));
   line("left out", left_out(scene, meshes, planes));
   line("bytes a particle", fmt::format("{}", costs.bytes_per_particle));
@@ -91,13 +98,13 @@ std::string explain(const io::Table& root, const std::string& name) {
   for (const auto i : scene.particle_materials())
     for (std::size_t j = 0; j < scene.materials.size(); ++j) {
       const auto& pair = scene.pair(i, j);
-      if (pair.modulus == 0 && pair.stiffness == 0) continue;
-      const bool hertz = scene.laws.normal == "hertz";
+      if (pair.laws.normal != "hertz" && pair.laws.normal != "linear") continue;
+      const bool hertz = pair.laws.normal == "hertz";
       const auto& shape = hertz ? hertz_impact : linear_impact;
       const double alpha = hertz ? pair.hertz_damping * std::sqrt(1.5) : 2 * pair.damping_ratio;
       // A gentle impact: 1 m/s between spheres of the first insertion, in units of that impact.
       const double radius = scene.insertions.front().radius / 2;
-      const double mass = scene.materials[i].density * 2.0 / 3.0 * M_PI * std::pow(2 * radius, 3);
+      const double mass = scene.materials[i].density * volume_of(scene.dimension, 2 * radius) / 2;
       const double unit = hertz ? std::pow(mass / (4.0 / 3.0 * pair.modulus * std::sqrt(radius)), 0.4) : std::sqrt(mass / pair.stiffness);
       const double got = integrated_restitution(shape, alpha, step / unit);
       line("restitution", fmt::format("{}–{}: {:.3f} asked, {:.4f} at this step in an impact of 1 m/s (error {:+.4f})", scene.materials[i].name,

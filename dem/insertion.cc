@@ -59,9 +59,9 @@ class Occupancy {
 
 }  // namespace
 
-Particles insert_particles(const Scene& scene, const WallSet& walls, bool rotates) {
+Particles insert_particles(const Scene& scene, const WallSet& walls) {
   Particles particles;
-  particles.rotates = rotates;
+  particles.kind = scene.kind();
   Random random(scene.seed);
   std::vector<const Insertion*> order;
   for (const auto& insertion : scene.insertions) order.push_back(&insertion);

@@ -24,6 +24,6 @@ class Random {
 
 /// Places every insertion of the scene, larger spheres first, clear of each other and of the walls' triangles.
 /// @throws io::UserError, located at the count, when a sphere finds no place in 20,000 tries
-Particles insert_particles(const Scene& scene, const WallSet& walls, bool rotates);
+Particles insert_particles(const Scene& scene, const WallSet& walls);
 
 }  // namespace acopla::dem

@@ -7,8 +7,9 @@
 #include <map>
 #include <set>
 
-#include "dem/contact/model.h"
 #include "dem/contact/restitution.h"
+#include "dem/laws.h"
+#include "dem/wall/read.h"
 
 namespace acopla::dem {
 
@@ -24,6 +25,24 @@ std::vector<std::uint8_t> Scene::particle_materials() const {
   return {used.begin(), used.end()};
 }
 
+std::vector<geometry::Box> Scene::regions() const {
+  std::vector<geometry::Box> boxes;
+  for (const auto& insertion : insertions) boxes.push_back({insertion.low, insertion.high});
+  return boxes;
+}
+
+std::vector<LawSet> Scene::law_sets() const {
+  std::vector<LawSet> sets;
+  for (const auto& pair : pairs)
+    if (!pair.laws.normal.empty() && std::find(sets.begin(), sets.end(), pair.laws) == sets.end()) sets.push_back(pair.laws);
+  return sets;
+}
+
+bool Scene::rotates() const {
+  const auto sets = law_sets();
+  return std::any_of(sets.begin(), sets.end(), [&](const LawSet& set) { return laws->rotates(set); });
+}
+
 namespace {
 
 constexpr io::Range density_range{0, 1e6, true, false, "A density is positive, and no solid reaches 1e6 kg/m3."};
@@ -33,20 +52,25 @@ constexpr io::Range restitution_range{0, 1, true, false, "1 is elastic; 0 would 
 // One [[contact]] entry: its laws and the values they need.
 struct ContactEntry {
   LawSet laws;
-  double restitution = 1, friction = 0, rolling_friction = 0, stiffness = 0, characteristic_velocity = 0, ratio = 20;
+  double restitution = 1, friction = 0, rolling_friction = 0;
+  std::vector<double> normal, tangential, rolling;
   bool printed_formula = false;
+  double own(std::size_t field) const { return normal[field]; }
 };
+
+// Where Linear's fields stand.
+enum LinearField : std::size_t { linear_stiffness, linear_velocity, linear_height, linear_overlap };
 
 class Reader {
  public:
   Reader(const io::Table& root, const std::string& name) : root_(root), table_(root.table(name)) { scene_.name = name; }
 
   Scene read() {
-    if (root_.integer("dimension", 2, 3) != 3)
-      root_.fail("dimension", "= 2: this version of acopla-dem computes spheres in three dimensions. Use dimension = 3.");
-    if (root_.has("gravity")) scene_.gravity = root_.vector("gravity", 3);
+    scene_.dimension = static_cast<int>(root_.integer("dimension", 2, 3));
+    if (root_.has("gravity")) scene_.gravity = root_.vector("gravity", scene_.dimension);
     table_.text("solver");
     table_.optional_number("advance_limit", io::positive);  // the coupler's key
+    read_laws();
     read_materials();
     read_walls();
     read_insertions();
@@ -57,6 +81,17 @@ class Reader {
   }
 
  private:
+  void read_laws() {
+    auto laws = std::make_shared<Laws>(Laws::built_in());
+    if (root_.has("plugins"))
+      for (const auto& library : root_.paths("plugins")) try {
+          laws->load(library);
+        } catch (const std::runtime_error& error) {
+          root_.fail("plugins", fmt::format("names {}, which {}", library, error.what()));
+        }
+    scene_.laws = laws;
+  }
+
   void read_materials() {
     for (const auto& [name, table] : table_.table("material").named_tables()) {
       Material material{name, table.number("density", density_range), 0, 0};
@@ -80,23 +115,10 @@ class Reader {
   }
 
   void read_walls() {
-    for (const auto& [name, table] : table_.table_or_empty("wall").named_tables()) {
-      Wall wall;
-      wall.name = name;
-      wall.material = material(table);
-      if (table.has("plane") == table.has("mesh")) table.fail("needs exactly one of plane and mesh.");
-      if (table.has("plane")) {
-        const auto plane = table.table("plane");
-        wall.is_plane = true;
-        wall.point = plane.vector("point", 3);
-        wall.normal = plane.vector("normal", 3);
-        if (!(wall.normal.norm() > 0)) plane.fail("normal", "has no length. It points to the side of the particles.");
-        wall.normal.normalize();
-      } else {
-        wall.mesh = io::read_stl(table.path("mesh"));
-      }
-      scene_.walls.push_back(std::move(wall));
-    }
+    std::vector<std::string> names;
+    for (const auto& known : scene_.materials) names.push_back(known.name);
+    for (const auto& [name, table] : table_.table_or_empty("wall").named_tables())
+      scene_.walls.push_back(read_wall(table, name, names, scene_.dimension));
   }
 
   void read_insertions() {
@@ -118,39 +140,53 @@ class Reader {
     if (scene_.insertions.empty()) table_.fail(fmt::format("has no particles. Add [[{}.insert]].", table_.name()));
   }
 
-  // A law is its name, or a table with `law` and its own values.
-  std::string law(const io::Table& entry, const char* key, const std::vector<std::string>& names, const char* fallback,
-                  ContactEntry& contact) {
-    if (!entry.has(key) && fallback) return fallback;
-    if (!entry.is_table(key)) return entry.choice(key, names);
-    const auto table = entry.table(key);
-    const auto name = table.choice("law", names);
-    if (name == Linear::name) {
-      if (table.has("stiffness") == table.has("characteristic_velocity"))
-        table.fail("needs exactly one of stiffness [N/m] and characteristic_velocity [m/s].");
-      contact.stiffness = table.optional_number("stiffness", io::positive).value_or(0);
-      contact.characteristic_velocity = table.optional_number("characteristic_velocity", io::positive).value_or(0);
+  // A law is its name, or a table with `law` and its own numbers, which the law declares.
+  std::vector<double> law(const io::Table& entry, const char* key, const std::vector<std::string>& names, bool optional,
+                          const LawInfo* (Laws::*find)(const std::string&) const, std::string& chosen) {
+    if (!entry.has(key) && optional) return {};
+    const bool table = entry.is_table(key);
+    const auto own = table ? entry.table(key) : entry;
+    chosen = table ? own.choice("law", names) : entry.choice(key, names);
+    std::vector<double> values;
+    for (const auto& field : (scene_.laws.get()->*find)(chosen)->fields) {
+      const bool required = field.fallback == Field::required;
+      if (!table) {
+        if (required) entry.fail(key, fmt::format("= \"{}\" needs {}{}: {}. Write {} = {{ law = \"{}\", {} = … }}.", chosen, field.key,
+                                                  unit(field), field.doc, key, chosen, field.key));
+        values.push_back(field.fallback == Field::optional ? std::nan("") : field.fallback);
+      } else if (required) {
+        values.push_back(own.number(field.key, field.range));
+      } else {
+        values.push_back(own.optional_number(field.key, field.range).value_or(field.fallback == Field::optional ? std::nan("") : field.fallback));
+      }
     }
-    if (name == LinearSlider::name) contact.ratio = table.number("ratio", io::positive, contact.ratio);
-    return name;
+    return values;
   }
+  static std::string unit(const Field& field) { return *field.unit ? fmt::format(" [{}]", field.unit) : ""; }
 
   ContactEntry read_contact(const io::Table& entry) {
     ContactEntry contact;
-    contact.laws.normal = law(entry, "normal", {Hertz::name, Linear::name}, nullptr, contact);
-    if (contact.laws.normal == Linear::name && !entry.is_table("normal"))
-      entry.fail("normal", "= \"linear\" needs its stiffness: normal = { law = \"linear\", stiffness = 1e5 }.");
-    contact.laws.tangential = law(entry, "tangential", {Mindlin::name, LinearSlider::name, "none"}, "none", contact);
-    contact.laws.rolling = law(entry, "rolling", {ConstantTorque::name, "none"}, "none", contact);
-    const bool hertz = contact.laws.normal == Hertz::name;
-    if (contact.laws.tangential != "none" && hertz != (contact.laws.tangential == Mindlin::name))
-      entry.fail("tangential", fmt::format("= \"{}\" does not go with normal = \"{}\": mindlin belongs to hertz, linear_slider to linear.",
-                                           contact.laws.tangential, contact.laws.normal));
+    auto& laws = contact.laws;
+    contact.normal = law(entry, "normal", scene_.laws->normals(), false, &Laws::normal, laws.normal);
+    contact.tangential = law(entry, "tangential", scene_.laws->tangentials(), true, &Laws::tangential, laws.tangential);
+    contact.rolling = law(entry, "rolling", scene_.laws->rollings(), true, &Laws::rolling, laws.rolling);
+    if (laws.normal == Linear::name) {
+      int rules = 0;
+      for (const auto field : {linear_stiffness, linear_velocity, linear_height}) rules += std::isfinite(contact.own(field));
+      if (rules != 1)
+        entry.fail("normal", "= \"linear\" needs exactly one of stiffness [N/m], characteristic_velocity [m/s] and drop_height [m]: "
+                             "normal = { law = \"linear\", stiffness = 1e5 }.");
+    }
+    if (scene_.laws->rolling(laws.rolling)->needs_friction && laws.tangential == "none")
+      entry.fail("rolling", fmt::format("= \"{}\" takes its spring from the tangential law, and there is none. Add tangential.", laws.rolling));
+    if (!scene_.laws->has(laws))
+      entry.fail("tangential", fmt::format("= \"{}\" does not go with normal = \"{}\": {} goes with {}.", laws.tangential, laws.normal,
+                                           laws.normal, fmt::join(scene_.laws->tangentials_of(laws.normal), ", ")));
     contact.restitution = entry.number("restitution", restitution_range);
     contact.printed_formula = entry.choice("damping", {"no_tension", "paper"}, "no_tension") == "paper";
-    if (contact.laws.tangential != "none") contact.friction = entry.number("friction", io::non_negative);
+    if (laws.tangential != "none") contact.friction = entry.number("friction", io::non_negative);
     else if (entry.has("friction")) entry.fail("friction", "has no effect without a tangential law. Add tangential = \"mindlin\" or remove it.");
-    if (contact.laws.rolling != "none") contact.rolling_friction = entry.number("rolling_friction", io::non_negative);
+    if (laws.rolling != "none") contact.rolling_friction = entry.number("rolling_friction", io::non_negative);
     else if (entry.has("rolling_friction")) entry.fail("rolling_friction", "has no effect without a rolling law. Add rolling = \"constant_torque\" or remove it.");
     return contact;
   }
@@ -158,7 +194,6 @@ class Reader {
   void read_contacts() {
     const auto count = scene_.materials.size();
     std::map<std::pair<std::size_t, std::size_t>, ContactEntry> entries;
-    bool first = true;
     std::vector<std::string> names;
     for (const auto& known : scene_.materials) names.push_back(known.name);
     const auto index = [&](const io::Table& entry, const std::string& name) {
@@ -172,11 +207,6 @@ class Reader {
     };
     for (const auto& entry : table_.list("contact")) {
       const auto contact = read_contact(entry);
-      if (!first && !(contact.laws == scene_.laws))
-        entry.fail(fmt::format("uses {} where the entries before use {}. One scene has one set of laws in this version; "
-                               "the values may differ by pair.", contact.laws.text(), scene_.laws.text()));
-      scene_.laws = contact.laws;
-      first = false;
       for (const auto& [a, b] : entry.text_pairs("between")) {
         const auto i = index(entry, a), j = index(entry, b);
         if (!entries.emplace(std::pair(std::min(i, j), std::max(i, j)), contact).second)
@@ -201,28 +231,29 @@ class Reader {
   PairProperties properties(std::size_t i, std::size_t j, const ContactEntry& contact) {
     const auto &a = scene_.materials[i], &b = scene_.materials[j];
     PairProperties pair;
-    if (contact.laws.normal == Hertz::name || contact.characteristic_velocity > 0) {
+    pair.laws = contact.laws;
+    const bool linear = pair.laws.normal == Linear::name;
+    const bool by_impact = linear && std::isfinite(contact.own(linear_velocity));
+    if (by_impact || scene_.laws->normal(pair.laws.normal)->needs_moduli || scene_.laws->tangential(pair.laws.tangential)->needs_moduli) {
       for (const auto* material : {&a, &b})
         if (material->shear_modulus <= 0)
-          table_.table("material").fail(material->name, fmt::format("needs shear_modulus (or young) and poisson for the law {}.",
-                                                                    contact.laws.normal));
+          table_.table("material").fail(material->name, fmt::format("needs shear_modulus (or young) and poisson for the laws {}.",
+                                                                    contact.laws.text()));
       pair.modulus = 1 / ((1 - a.poisson * a.poisson) / a.young() + (1 - b.poisson * b.poisson) / b.young());
       pair.shear_modulus = 1 / ((2 - a.poisson) / a.shear_modulus + (2 - b.poisson) / b.shear_modulus);
     }
     pair.restitution = contact.restitution;
     pair.friction = contact.friction;
     pair.rolling_friction = contact.rolling_friction;
-    pair.stiffness_ratio = contact.ratio;
-    if (contact.laws.normal == Hertz::name) {
-      // 2 sqrt(5/6) β; in units of the impact α = 2 sqrt(5/6) β sqrt(3/2), because S_n = (3/2) k sqrt(δ).
-      pair.hertz_damping = contact.printed_formula ? 2 * std::sqrt(5.0 / 6.0) * printed_damping_ratio(contact.restitution)
-                                                   : dashpot(hertz_impact, contact.restitution) / std::sqrt(1.5);
-    } else {
-      pair.stiffness = contact.characteristic_velocity > 0 ? from_velocity(pair.modulus, i, j, contact.characteristic_velocity)
-                                                           : contact.stiffness;
-      pair.damping_ratio = contact.printed_formula ? printed_damping_ratio(contact.restitution)
-                                                   : dashpot(linear_impact, contact.restitution) / 2;
-    }
+    pair.normal_values = contact.normal;
+    pair.tangential_values = contact.tangential;
+    pair.rolling_values = contact.rolling;
+    // 2 sqrt(5/6) β; in units of the impact α = 2 sqrt(5/6) β sqrt(3/2), because S_n = (3/2) k sqrt(δ).
+    const double printed = printed_damping_ratio(contact.restitution);
+    if (pair.laws.normal == Hertz::name)
+      pair.hertz_damping = contact.printed_formula ? 2 * std::sqrt(5.0 / 6.0) * printed : dashpot(hertz_impact, contact.restitution) / std::sqrt(1.5);
+    pair.damping_ratio = contact.printed_formula ? printed : dashpot(linear_impact, contact.restitution) / 2;
+    if (linear) pair.stiffness = stiffness(pair.modulus, i, j, contact);
     return pair;
   }
 
@@ -233,28 +264,44 @@ class Reader {
     return entry->second;
   }
 
-  // Eq. 12 with the smallest particles of the two materials; against a wall the particle's own radius and mass.
-  double from_velocity(double modulus, std::size_t i, std::size_t j, double speed) const {
-    double radius = 0, mass = 0;
-    const auto smallest = [&](std::size_t material) -> const Insertion* {
-      const Insertion* found = nullptr;
-      for (const auto& insertion : scene_.insertions)
-        if (insertion.material == material && (!found || insertion.radius < found->radius)) found = &insertion;
-      return found;
-    };
-    const auto sphere_mass = [&](const Insertion& insertion) {
-      return scene_.materials[insertion.material].density * 4.0 / 3.0 * M_PI * std::pow(insertion.radius, 3);
-    };
-    const auto *a = smallest(i), *b = smallest(j);
-    if (a && b) {
-      radius = a->radius * b->radius / (a->radius + b->radius);
-      mass = sphere_mass(*a) * sphere_mass(*b) / (sphere_mass(*a) + sphere_mass(*b));
-    } else {
-      const auto& own = a ? *a : *b;
-      radius = own.radius;
-      mass = sphere_mass(own);
+  // The linear spring, given or by one of the papers' rules with the smallest particles of the two materials; against a wall, with the
+  // particle's own radius and mass.
+  double stiffness(double modulus, std::size_t i, std::size_t j, const ContactEntry& contact) const {
+    if (std::isfinite(contact.own(linear_stiffness))) return contact.own(linear_stiffness);
+    const double a = smallest_radius(i), b = smallest_radius(j);
+    const auto mass_of = [&](std::size_t material, double r) { return scene_.materials[material].density * volume_of(scene_.dimension, r); };
+    const double radius = a > 0 && b > 0 ? a * b / (a + b) : std::max(a, b);
+    const double mass_a = a > 0 ? mass_of(i, a) : 0, mass_b = b > 0 ? mass_of(j, b) : 0;
+    const double mass = a > 0 && b > 0 ? mass_a * mass_b / (mass_a + mass_b) : std::max(mass_a, mass_b);
+    if (std::isfinite(contact.own(linear_velocity))) return stiffness_of_impact(modulus, radius, mass, contact.own(linear_velocity));
+    // Gomes's rule is for the heaviest body that falls onto the smallest overlap allowed.
+    const double gravity = scene_.gravity.norm();
+    if (!(gravity > 0)) table_.fail("contact", "has a drop_height, which needs gravity. Give gravity, or a stiffness.");
+    double heaviest = 0, smallest = std::numeric_limits<double>::infinity();
+    for (const auto& insertion : scene_.insertions) {
+      heaviest = std::max(heaviest, mass_of(insertion.material, insertion.radius));
+      smallest = std::min(smallest, insertion.radius);
     }
-    return stiffness_of_impact(modulus, radius, mass, speed);
+    return stiffness_of_fall(heaviest, gravity, contact.own(linear_height), contact.own(linear_overlap) * smallest);
+  }
+
+  // Of a material's particles; 0 where it has none.
+  double smallest_radius(std::size_t material) const {
+    double radius = 0;
+    for (const auto& insertion : scene_.insertions)
+      if (insertion.material == material && (radius == 0 || insertion.radius < radius)) radius = insertion.radius;
+    return radius;
+  }
+
+  void read_damping() {
+    const auto damping = table_.table_or_empty("damping");
+    if (damping.has("viscous")) {
+      const auto viscous = damping.table("viscous");
+      scene_.damping.translation = viscous.number("translation", io::non_negative, 0);
+      scene_.damping.rotation = viscous.number("rotation", io::non_negative, 0);
+    }
+    constexpr io::Range share{0, 1, false, true, "It is a share of the unbalanced force; 0.7 is usual for quasi-static work."};
+    scene_.damping.local = damping.number("local", share, 0);
   }
 
   void read_numbers() {
@@ -266,10 +313,20 @@ class Reader {
     if (scene_.step_fraction > 1 && !scene_.allow_unstable_step)
       table_.fail("step_fraction", fmt::format("= {:.4g} is above the critical step. Use at most 1 (default 0.2), or say "
                                                "allow_unstable_step = true.", scene_.step_fraction));
+    read_damping();
+    scene_.threads = static_cast<unsigned>(table_.integer("threads", 1, 1024, 1));
+    scene_.partitions = static_cast<unsigned>(table_.integer("partitions", 1, 4096, scene_.threads));
+    scene_.keeps_ledger = table_.flag("energy", false);
+    scene_.drift_limit = table_.number("drift_limit", io::positive, scene_.drift_limit);
+    if (table_.has("drift_limit") && !scene_.keeps_ledger) table_.fail("drift_limit", "has no effect without the energy ledger. Add energy = true.");
     if (table_.has("domain")) {
-      const auto corners = table_.vectors("domain", 3);
+      const auto corners = table_.vectors("domain", scene_.dimension);
       if (corners.size() != 2) table_.fail("domain", "must be two corners, [[x, y, z], [x, y, z]].");
       scene_.domain = {corners[0].cwiseMin(corners[1]), corners[0].cwiseMax(corners[1])};
+      if (scene_.dimension == 2) {
+        scene_.domain->low[2] = -1;
+        scene_.domain->high[2] = 1;
+      }
     }
     const auto output = table_.table_or_empty("output");
     scene_.write_particles = output.flag("particles", true);

@@ -3,15 +3,19 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "dem/contact/pair_properties.h"
+#include "dem/damping.h"
 #include "dem/wall/wall_set.h"
 #include "io/case_table.h"
 
 namespace acopla::dem {
+
+class Laws;
 
 struct Material {
   std::string name;
@@ -19,6 +23,14 @@ struct Material {
   double shear_modulus = 0;  ///< G [Pa]; 0 where no law needs it
   double poisson = 0;
   double young() const { return 2 * shear_modulus * (1 + poisson); }
+};
+
+/// A particle that comes into a running scene.
+struct NewParticle {
+  Vec3 at;
+  double radius = 0, density = 0;
+  std::uint8_t material = 0;
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
 };
 
 /// Spheres of one size, placed at random without overlap.
@@ -31,25 +43,24 @@ struct Insertion {
   io::Location where;                            ///< in the case, for the message when there is no room
 };
 
-/// Names of the laws of a scene; one set for all its pairs of materials.
-struct LawSet {
-  std::string normal, tangential = "none", rolling = "none";
-  bool operator==(const LawSet&) const = default;
-  std::string text() const { return normal + " + " + tangential + " + " + rolling; }
-};
-
 struct Scene {
   std::string name;              ///< of the participant
+  int dimension = 3;             ///< 2: discs of unit depth; 3: spheres
   Vec3 gravity = Vec3::Zero();   ///< [m/s²]
-  LawSet laws;
+  std::shared_ptr<const Laws> laws;   ///< what the case may name; open while its kernels run
   std::vector<Material> materials;
   std::vector<PairProperties> pairs;  ///< [i · materials + j], symmetric
   std::vector<Wall> walls;
   std::vector<Insertion> insertions;
+  Damping damping;
   std::uint64_t seed = 1;
   double step_fraction = 0.2;
   std::optional<double> step;  ///< fixed by the case [s]
   bool allow_unstable_step = false;
+  unsigned threads = 1;
+  unsigned partitions = 1;     ///< results depend on this and not on `threads`
+  bool keeps_ledger = false;
+  double drift_limit = 0.05;   ///< of the energy ledger, relative
   std::optional<geometry::Box> domain;
   double output_every = 0;     ///< [s]; 0: only the end
   bool write_particles = true;
@@ -58,6 +69,13 @@ struct Scene {
   std::size_t particle_count() const;
   /// Materials that particles are made of.
   std::vector<std::uint8_t> particle_materials() const;
+  /// Boxes around everything that particles are put into.
+  std::vector<geometry::Box> regions() const;
+  /// The laws that are used, each set once.
+  std::vector<LawSet> law_sets() const;
+  /// Some law turns the particles.
+  bool rotates() const;
+  ParticleKind kind() const { return {dimension, rotates()}; }
 };
 
 /// Reads and checks the participant's table; reads the wall meshes it names. @throws io::UserError

@@ -33,6 +33,7 @@ struct Double4 {
   friend Double4 operator/(const Double4& a, const Double4& b) { return Double4(a.v / b.v); }
   friend Double4 operator-(const Double4& a) { return Double4(-a.v); }
   friend Mask4 operator<(const Double4& a, const Double4& b) { return {a.v < b.v}; }
+  friend Mask4 operator==(const Double4& a, const Double4& b) { return {a.v == b.v}; }
   friend Mask4 operator>(const Double4& a, const Double4& b) { return {a.v > b.v}; }
 };
 

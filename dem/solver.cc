@@ -43,7 +43,7 @@ std::vector<protocol::Surface> Solver::start(const protocol::Run& run) {
     if (wall.mesh.dropped)
       fmt::print(stderr, "wall {}: {} degenerate triangles were left out\n", wall.name, wall.mesh.dropped);
   }
-  auto particles = insert_particles(scene_, walls, rotates(scene_.laws));
+  auto particles = insert_particles(scene_, walls);
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses)
     for (const auto& wall : scene_.walls)
@@ -79,7 +79,7 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
     for (std::size_t w = 0; w < scene_.walls.size(); ++w)
       if (scene_.walls[w].name == name)
         result.fields.push_back({name, "force",
-                                 {load.vertex_force.begin() + first_vertex_[w], load.vertex_force.begin() + first_vertex_[w + 1]}});
+                                 load.vertex_force[w]});
   result.quantities = quantities(step);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   seconds_ += seconds;
@@ -97,13 +97,13 @@ std::vector<std::pair<std::string, double>> Solver::quantities(double step) cons
   std::vector<std::pair<std::string, double>> values;
   const auto& load = engine_->wall_load();
   for (std::size_t w = 0; w < scene_.walls.size(); ++w)
-    for (int d = 0; d < 3; ++d)
-      values.emplace_back(fmt::format("{}.force.{}", scene_.walls[w].name, "xyz"[d]), load.wall_force[w][d]);
+    for (int d = 0; d < scene_.dimension; ++d)
+      values.emplace_back(fmt::format("{}.force.{}", scene_.walls[w].name, "xyz"[d]), load.walls[w].force[d]);
   values.emplace_back("weight", engine_->mass() * scene_.gravity.norm());
   values.emplace_back("kinetic_energy", engine_->kinetic_energy());
   values.emplace_back("particles", static_cast<double>(engine_->particles().size()));
   values.emplace_back("contacts", static_cast<double>(engine_->contact_count()));
-  values.emplace_back("step_ratio", engine_->step_ratio(step));
+  values.emplace_back("step_ratio", engine_->step_ratio(step).value);
   values.emplace_back("overlap.max", engine_->worst_overlap());
   return values;
 }
@@ -115,8 +115,8 @@ void Solver::write_particles(double time) {
   for (std::size_t i = 0; i < p.size(); ++i) {
     points.push_back(p.position[i].vector());
     radius.values.push_back(p.position[i].w);
-    for (int d = 0; d < 3; ++d) velocity.values.push_back(p.velocity[i].vector()[d]);
-    speed.values.push_back(p.velocity[i].vector().norm());
+    for (int d = 0; d < 3; ++d) velocity.values.push_back(p.velocity_of(i)[d]);
+    speed.values.push_back(p.velocity_of(i).norm());
     id.values.push_back(p.id[i]);
   }
   const auto file = fmt::format("{}/{}_{:06}.vtp", run_.results, scene_.name, std::llround(time / run_.tick));

@@ -16,15 +16,17 @@ CriticalStep critical_step(const Scene& scene) {
     const auto& material = scene.materials[insertion.material];
     if (material.shear_modulus > 0)
       consider(M_PI * insertion.radius * std::sqrt(material.density / material.shear_modulus) / (0.1631 * material.poisson + 0.8766),
-               fmt::format("Rayleigh time of {} spheres of {:.4g} m", material.name, 2 * insertion.radius));
-    const double mass = material.density * 4.0 / 3.0 * M_PI * std::pow(insertion.radius, 3);
+               fmt::format("Rayleigh time of {} {} of {:.4g} m", material.name, scene.dimension == 2 ? "discs" : "spheres", 2 * insertion.radius));
+    const double mass = material.density * volume_of(scene.dimension, insertion.radius);
     for (std::size_t other = 0; other < scene.materials.size(); ++other) {
       const auto& pair = scene.pair(insertion.material, other);
       if (pair.stiffness <= 0) continue;
-      constexpr double contacts = 12;
-      const double omega = std::sqrt(2 * contacts * pair.stiffness / (3 * mass));
+      // A dense packing, its stiffness spread over all directions: twelve spheres or six discs around one.
+      const double contacts = scene.dimension == 2 ? 6 : 12;
+      const double omega = std::sqrt(2 * contacts * pair.stiffness / (scene.dimension * mass));
       consider(2 / omega * (std::sqrt(1 + pair.damping_ratio * pair.damping_ratio) - pair.damping_ratio),
-               fmt::format("springs of {} spheres of {:.4g} m against {}", material.name, 2 * insertion.radius, scene.materials[other].name));
+               fmt::format("springs of {} {} of {:.4g} m against {}", material.name, scene.dimension == 2 ? "discs" : "spheres",
+                           2 * insertion.radius, scene.materials[other].name));
     }
   }
   return critical;

@@ -285,8 +285,15 @@ std::vector<std::pair<std::string, std::string>> Table::text_pairs(std::string_v
   return pairs;
 }
 
-std::string Table::path(std::string_view key, bool must_exist) const {
-  const auto given = text(key);
+std::string Table::path(std::string_view key, bool must_exist) const { return full_path(key, text(key), must_exist); }
+
+std::vector<std::string> Table::paths(std::string_view key) const {
+  std::vector<std::string> full;
+  for (const auto& given : texts(key)) full.push_back(full_path(key, given, true));
+  return full;
+}
+
+std::string Table::full_path(std::string_view key, const std::string& given, bool must_exist) const {
   const auto full = (std::filesystem::path(folder()) / given).lexically_normal();
   std::error_code ignored;
   if (must_exist && !std::filesystem::exists(full, ignored))

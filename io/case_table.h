@@ -66,6 +66,8 @@ class Table {
   std::vector<std::pair<std::string, std::string>> text_pairs(std::string_view key) const;
   /// A path, made absolute against the case file's folder. @throws UserError when `must_exist` and it does not.
   std::string path(std::string_view key, bool must_exist = true) const;
+  /// A list of paths that must exist.
+  std::vector<std::string> paths(std::string_view key) const;
 
   /// True where the key holds text, a table, a list of tables.
   bool is_text(std::string_view key) const;
@@ -101,6 +103,7 @@ class Table {
   std::string folder() const;         ///< absolute folder of the case file
 
  private:
+  std::string full_path(std::string_view key, const std::string& given, bool must_exist) const;
   Table(std::shared_ptr<CaseDocument> document, const void* node, std::string name);
   std::shared_ptr<CaseDocument> document_;
   const void* node_ = nullptr;  // a toml::table, or null for an empty one

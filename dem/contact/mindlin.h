@@ -3,12 +3,12 @@
 #include <array>
 
 #include "dem/contact/hertz.h"
+#include "dem/contact/slider.h"
 
 namespace acopla::dem {
 
 /// Mindlin tangential contact in increments, with Coulomb's limit (Nasato 2011, eq. 7–9 as corrected: the printed secant
-/// law creates energy when the overlap changes; Thornton, Cummins & Cleary 2013). The increment is the trapezoidal rule over the
-/// step's two slips, of second order: with the slip at the step's end alone the spring would act as a dashpot of k Δt/2.
+/// law creates energy when the overlap changes; Thornton, Cummins & Cleary 2013).
 struct Mindlin {
   static constexpr const char* name = "mindlin";
   static constexpr bool needs_moduli = true;
@@ -23,12 +23,13 @@ struct Mindlin {
     return {pair.shear_modulus, std::sqrt(4 * pair.shear_modulus / pair.modulus), pair.hertz_damping, pair.friction};
   }
 
-  /// Elastic force on i half an increment ahead [N], and the stiffness of the last step [N/m].
+  /// Elastic force on i [N], and the stiffness of the last step [N/m].
   template <class K>
   struct History {
-    typename K::Turn ahead;
+    typename K::Turn force;
     typename K::Real stiffness;
   };
+  template <int>
   static constexpr std::array stored{Stored::force, Stored::scalar};
 
   /// S_t = 8 G* sqrt(R* δ), eq. 8
@@ -43,31 +44,18 @@ struct Mindlin {
   }
 
   /// @param normal_force  [N]
-  /// @return tangential force on i [N]; its elastic part is left in `elastic`
+  /// @return tangential force on i [N]; `before` and history.force: its elastic part at the beginning and at the end of the step
   template <class Normal, class K>
   static typename K::Turn force(const K& k, const typename K::Real& normal_force, const Parameters& p,
-                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& elastic) {
+                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& before) {
     using Real = typename K::Real;
     const Real present = stiffness<Normal>(k, p, normal);
     // Where the contact unloads, the spring of the lost area gives its force back; without this, energy is created.
     const Real kept = select(present < history.stiffness, present / history.stiffness, Real(1));
-    const auto half = (0.5 * k.step * present) * k.slip;
-    const auto trial = kept * turned_with_frame(history.ahead, k) - half;
-    const auto result = held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
-    history.ahead = elastic - half;
+    before = turned_with_frame(history.force, k);
     history.stiffness = present;
-    return result;
-  }
-
-  /// Coulomb's limit on a spring and its dashpot: where the spring alone reaches μ F_n the contact slides, the spring keeps what
-  /// friction can hold and the dashpot is off (Gomes 2014, eq. 2.49–2.52); else both act together, up to the limit.
-  template <class Turn, class Real>
-  static Turn held_by_friction(const Turn& trial, const Real& limit, const Real& dashpot, const Turn& slip, Turn& elastic) {
-    const auto slides = dot(trial, trial) > limit * limit;
-    const Turn together = trial - select(slides, Real(0), dashpot) * slip;
-    const Turn result = shortened(together, limit);
-    elastic = select(slides, result, trial);
-    return result;
+    return held_by_friction(kept * before - (k.step * present) * k.slip, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip,
+                            history.force);
   }
 };
 

@@ -17,8 +17,17 @@ template <class Real>
 struct ContactEnergy {
   Real normal = Real(0), tangential = Real(0), rolling = Real(0);  ///< stored in the springs now [J]
   Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant [W]
-  Real tangential_power = Real(0);    ///< taken from the bodies by tangential forces [W]
-  Real rolling_power = Real(0);       ///< taken from the bodies by rolling torques [W]
+  Real tangential_work = Real(0);     ///< taken from the bodies by tangential forces in the last step [J]
+  Real rolling_work = Real(0);        ///< taken from the bodies by rolling torques in the last step [J]
+
+  void add(const ContactEnergy& other) {
+    normal += other.normal;
+    tangential += other.tangential;
+    rolling += other.rolling;
+    normal_dashpot += other.normal_dashpot;
+    tangential_work += other.tangential_work;
+    rolling_work += other.rolling_work;
+  }
 };
 
 template <class NormalLaw, class TangentialLaw, class RollingLaw>
@@ -42,15 +51,16 @@ struct ContactModel {
   /// What a contact carries from step to step. Where the laws store nothing, nothing is stored.
   template <class K>
   struct History {
+    typename K::Real closing_speed;  // of the last half step, to extrapolate from; 0 where the contact is new
     [[no_unique_address]] typename Tangential::template History<K> tangential;
     [[no_unique_address]] typename Rolling::template History<K> rolling;
   };
   template <class K>
   static constexpr std::size_t history_size() {
-    std::size_t size = 0;
+    std::size_t size = 1;
     const auto count = [&](Stored stored) { size += stored == Stored::scalar ? 1 : static_cast<std::size_t>(K::turns); };
-    for (const auto stored : Tangential::stored) count(stored);
-    for (const auto stored : Rolling::stored) count(stored);
+    for (const auto stored : Tangential::template stored<K::dimension>) count(stored);
+    for (const auto stored : Rolling::template stored<K::dimension>) count(stored);
     return size;
   }
   /// +1 or −1 for every stored number: its factor when the bodies change names.
@@ -58,12 +68,13 @@ struct ContactModel {
   static constexpr auto swap_signs() {
     std::array<double, history_size<K>()> signs{};
     std::size_t at = 0;
+    signs[at++] = 1;  // closing_speed
     const auto add = [&](Stored stored) {
       const bool flips = stored == Stored::torque || (stored == Stored::force && K::dimension == 3);
       for (int n = 0; n < (stored == Stored::scalar ? 1 : K::turns); ++n) signs[at++] = flips ? -1.0 : 1.0;
     };
-    for (const auto stored : Tangential::stored) add(stored);
-    for (const auto stored : Rolling::stored) add(stored);
+    for (const auto stored : Tangential::template stored<K::dimension>) add(stored);
+    for (const auto stored : Rolling::template stored<K::dimension>) add(stored);
     return signs;
   }
 
@@ -87,20 +98,23 @@ struct ContactModel {
     }
     Real shear_stiffness(0);
     if constexpr (has_friction) {
-      typename K::Turn elastic;
+      typename K::Turn before;
       shear_stiffness = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
-      response.shear = Tangential::template force<Normal>(k, response.normal, p.tangential, p.normal, history.tangential, elastic);
+      response.shear = Tangential::template force<Normal>(k, response.normal, p.tangential, p.normal, history.tangential, before);
       if (energy) {
+        // The spring's mean over the step, and its dashpot: with x_n − x_{n−1} = Δt v_{n−½} the spring's part is exact.
+        const auto& elastic = history.tangential.force;
         energy->tangential = select(shear_stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear_stiffness), Real(0));
-        energy->tangential_power = -dot(response.shear, k.slip);
+        energy->tangential_work = -(Real(k.step) * dot(response.shear - elastic + Real(0.5) * (before + elastic), k.slip));
       }
     }
     if constexpr (has_rolling) {
-      Real stored;
-      response.torque = Rolling::torque(k, response.normal, shear_stiffness, p.rolling, history.rolling, stored);
+      Real stored, work;
+      response.torque = Rolling::torque(k, response.normal, shear_stiffness, p.rolling, history.rolling, stored, work);
+      response.torque = select(touches, response.torque, zero_vector<Real, K::turns>());
       if (energy) {
         energy->rolling = stored;
-        energy->rolling_power = -dot(response.torque, k.relative_spin);
+        energy->rolling_work = work;
       }
     }
     return response;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "io/case_table.h"
@@ -20,8 +21,16 @@ struct Field {
   static constexpr double optional = -std::numeric_limits<double>::infinity();
 };
 
+/// Names of the laws of a contact.
+struct LawSet {
+  std::string normal, tangential = "none", rolling = "none";
+  bool operator==(const LawSet&) const = default;
+  std::string text() const { return normal + " + " + tangential + " + " + rolling; }
+};
+
 /// Properties of a pair of materials. A value that the scene's laws do not use is left at 0.
 struct PairProperties {
+  LawSet laws;                  ///< without a normal law the pair never meets
   double modulus = 0;           ///< Y* = 1 / ((1−ν_i²)/E_i + (1−ν_j²)/E_j) [Pa]
   double shear_modulus = 0;     ///< G* = 1 / ((2−ν_i)/G_i + (2−ν_j)/G_j) [Pa]
   double stiffness = 0;         ///< linear normal spring [N/m]

@@ -1,14 +1,8 @@
-#include "dem/engine_of.h"
-#include "dem/kernels/kernels.h"
+#include "dem/kernels/built_in.h"
+#include "dem/laws.h"
 
 namespace acopla::dem {
 
-std::unique_ptr<Engine> hertz_mindlin_engine(const Scene& scene, Particles particles, WallSet walls) {
-  return std::make_unique<EngineOf<ContactModel<Hertz, Mindlin, FreeRolling>>>(scene, std::move(particles), std::move(walls));
-}
-
-std::unique_ptr<Engine> hertz_mindlin_rolling_engine(const Scene& scene, Particles particles, WallSet walls) {
-  return std::make_unique<EngineOf<ContactModel<Hertz, Mindlin, ConstantTorque>>>(scene, std::move(particles), std::move(walls));
-}
+void add_hertz_mindlin(Laws& laws) { laws.add_with_rolling<Hertz, Mindlin>(); }
 
 }  // namespace acopla::dem

@@ -58,7 +58,7 @@ class KernelOf final : public Kernel {
   using Turn = typename Pack::Turn;
   using History = typename Model::template History<Pack>;
   static constexpr std::size_t numbers = Model::template history_size<Pack>();
-  static_assert(numbers == 0 || sizeof(History) == numbers * sizeof(Double4), "a law's History holds what its `stored` lists");
+  static_assert(sizeof(History) == numbers * sizeof(Double4), "a law's History holds what its `stored` lists");
 
   // One body of a pack of contacts.
   struct Body {
@@ -130,10 +130,8 @@ class KernelOf final : public Kernel {
 
   // Histories of lanes that do not touch are forgotten.
   static void keep_while_touching(HistoryLane* stored, const Pack& k) {
-    if constexpr (numbers > 0) {
-      const auto touches = k.overlap > Double4(0.0);
-      for (std::size_t n = 0; n < numbers; ++n) store(stored[n].value, select(touches, load(stored[n].value), Double4(0.0)));
-    }
+    const auto touches = k.overlap > Double4(0.0);
+    for (std::size_t n = 0; n < numbers; ++n) store(stored[n].value, select(touches, load(stored[n].value), Double4(0.0)));
   }
 
   static void add(ContactEnergy<double>& total, const ContactEnergy<Double4>& pack, const Double4& weight) {
@@ -141,8 +139,8 @@ class KernelOf final : public Kernel {
     total.tangential += sum(weight * pack.tangential);
     total.rolling += sum(weight * pack.rolling);
     total.normal_dashpot += sum(weight * pack.normal_dashpot);
-    total.tangential_power += sum(weight * pack.tangential_power);
-    total.rolling_power += sum(weight * pack.rolling_power);
+    total.tangential_work += sum(weight * pack.tangential_work);
+    total.rolling_work += sum(weight * pack.rolling_work);
   }
   // 1 in the lanes that count.
   static Double4 counting(std::size_t count) {
@@ -150,9 +148,11 @@ class KernelOf final : public Kernel {
   }
 
   template <bool ledger>
-  typename Model::template Response<Pack> answer(const Pack& k, HistoryLane* stored, const Double4& weight, ContactEnergy<double>* total) const {
-    History empty;
-    History& history = numbers > 0 ? *reinterpret_cast<History*>(stored) : empty;
+  typename Model::template Response<Pack> answer(Pack& k, HistoryLane* stored, const Double4& weight, ContactEnergy<double>* total) const {
+    History& history = *reinterpret_cast<History*>(stored);
+    const Double4 half_step = k.closing_speed, before = history.closing_speed;
+    k.closing_speed = select(before == Double4(0.0), half_step, 1.5 * half_step - 0.5 * before);
+    history.closing_speed = half_step;
     typename Model::template Response<Pack> r;
     if constexpr (ledger) {
       ContactEnergy<Double4> energy;
@@ -196,7 +196,7 @@ class KernelOf final : public Kernel {
         k.relative_spin = spin_i - spin_j;
         if constexpr (Model::has_rolling) set_inertias(k, a, b);
       }
-      HistoryLane* const stored = numbers > 0 ? &contacts.history[c / lanes * numbers] : nullptr;
+      HistoryLane* const stored = &contacts.history[c / lanes * numbers];
       const auto r = answer<ledger>(k, stored, ledger ? counting(count) : Double4(1.0), energy);
       const auto force = force_of(r, k.normal);
       Turn on_i, on_j;
@@ -272,7 +272,7 @@ class KernelOf final : public Kernel {
           k.rolling_inertia = k.reduced_inertia + a.velocity.w * a.position.w * a.position.w;
         }
       }
-      HistoryLane* const stored = numbers > 0 ? &contacts.history[c / lanes * numbers] : nullptr;
+      HistoryLane* const stored = &contacts.history[c / lanes * numbers];
       const auto r = answer<ledger>(k, stored, ledger ? wall.w * counting(count) : Double4(1.0), energy);
       const auto force = wall.w * force_of(r, k.normal);
       Turn torque = zero_vector<Double4, Pack::turns>();

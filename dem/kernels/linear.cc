@@ -1,22 +1,8 @@
-#include "dem/engine_of.h"
-#include "dem/kernels/kernels.h"
+#include "dem/kernels/built_in.h"
+#include "dem/laws.h"
 
 namespace acopla::dem {
 
-std::unique_ptr<Engine> linear_engine(const Scene& scene, Particles particles, WallSet walls) {
-  return std::make_unique<EngineOf<ContactModel<Linear, Frictionless, FreeRolling>>>(scene, std::move(particles), std::move(walls));
-}
-
-std::unique_ptr<Engine> linear_rolling_engine(const Scene& scene, Particles particles, WallSet walls) {
-  return std::make_unique<EngineOf<ContactModel<Linear, Frictionless, ConstantTorque>>>(scene, std::move(particles), std::move(walls));
-}
-
-std::unique_ptr<Engine> linear_slider_engine(const Scene& scene, Particles particles, WallSet walls) {
-  return std::make_unique<EngineOf<ContactModel<Linear, LinearSlider, FreeRolling>>>(scene, std::move(particles), std::move(walls));
-}
-
-std::unique_ptr<Engine> linear_slider_rolling_engine(const Scene& scene, Particles particles, WallSet walls) {
-  return std::make_unique<EngineOf<ContactModel<Linear, LinearSlider, ConstantTorque>>>(scene, std::move(particles), std::move(walls));
-}
+void add_linear(Laws& laws) { laws.add_with_rolling<Linear, Frictionless>(); }
 
 }  // namespace acopla::dem

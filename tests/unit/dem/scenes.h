@@ -99,13 +99,13 @@ struct Ball {
 
 inline std::unique_ptr<Engine> engine_with(Scene scene, const std::vector<Ball>& balls, std::vector<Wall> walls = {}) {
   Particles particles;
-  particles.rotates = rotates(scene.laws);
-  for (const auto& ball : balls) {
-    particles.add(ball.at, radius, density, 0, ball.velocity);
-    if (particles.rotates) particles.spin.back().set(ball.spin);
-  }
+  particles.kind = scene.kind();
+  for (const auto& ball : balls) particles.add(ball.at, radius, density, 0, ball.velocity, ball.spin);
   scene.walls = walls;
-  return make_engine(scene, std::move(particles), WallSet(std::move(walls)));
+  WallSet set(std::move(walls));
+  for (std::size_t w = 0; w < set.walls().size(); ++w)
+    if (!set.walls()[w].is_plane) set.send(w);
+  return make_engine(scene, std::move(particles), std::move(set));
 }
 
 /// Index of a particle by its id (the engine sorts).
@@ -114,8 +114,8 @@ inline std::size_t index_of(const Engine& engine, std::uint32_t id) {
   return static_cast<std::size_t>(std::find(ids.begin(), ids.end(), id) - ids.begin());
 }
 inline Vec3 position(const Engine& engine, std::uint32_t id = 0) { return engine.particles().position[index_of(engine, id)].vector(); }
-inline Vec3 velocity(const Engine& engine, std::uint32_t id = 0) { return engine.particles().velocity[index_of(engine, id)].vector(); }
-inline Vec3 spin(const Engine& engine, std::uint32_t id = 0) { return engine.particles().spin[index_of(engine, id)].vector(); }
+inline Vec3 velocity(const Engine& engine, std::uint32_t id = 0) { return engine.particles().velocity_of(index_of(engine, id)); }
+inline Vec3 spin(const Engine& engine, std::uint32_t id = 0) { return engine.particles().spin_of(index_of(engine, id)); }
 
 inline double rayleigh_time() { return M_PI * radius * std::sqrt(density / shear) / (0.1631 * poisson + 0.8766); }
 

@@ -1,0 +1,79 @@
+// Pairs that touch or nearly touch, sorted by their pair of materials, with the histories of their contacts.
+#pragma once
+
+#include <vector>
+
+#include "dem/kernel_table.h"
+#include "dem/neighbours.h"
+
+namespace acopla::dem {
+
+/// Histories between two lists of neighbours: the particles may have new places in between.
+class SavedPairs {
+ public:
+  void clear();
+  void add(std::uint32_t i, std::uint32_t j, std::size_t group, const HistoryLane* first, std::size_t numbers, std::size_t lane);
+  /// Gives the pairs their new places, and sorts them by the lower one. @param place  new place of every old one; `gone` where removed
+  void settle(const std::vector<std::uint32_t>& place, const KernelTable& kernels, std::size_t particles);
+  /// The history of the pair i < j in that group, or null.
+  const double* find(std::uint32_t i, std::uint32_t j) const;
+
+  static constexpr std::uint32_t gone = ~0u;
+
+ private:
+  struct Pair {
+    std::uint32_t i, j;
+    std::uint32_t group;
+    std::uint32_t first;  // in values_
+  };
+  std::vector<Pair> pairs_, sorted_;
+  std::vector<std::uint32_t> start_;
+  std::vector<double> values_;
+};
+
+/// The touching pairs of one partition: those that the list of neighbours holds and that are nearer than a small skin of their own, so
+/// that the list serves for some steps. Pairs whose second member is another partition's particle are kept apart: the force on that
+/// member is exported.
+class TouchingPairs {
+ public:
+  /// Finds the pairs anew. Their histories come from the present ones, or, where the list of neighbours is new, from `saved`.
+  /// @param rows  neighbours of the particles first, first + 1, … last − 1
+  void refresh(const Particles& particles, const PairList& rows, std::uint32_t first, std::uint32_t last, double skin,
+               const KernelTable& kernels, const SavedPairs* saved);
+  /// Adds every history that is not zero.
+  void save(SavedPairs& saved, const KernelTable& kernels) const;
+  /// Forces of all pairs.
+  void evaluate(const KernelTable& kernels, Particles& particles, double step, ContactEnergy<double>* energy);
+
+  /// Forces on other partitions' particles, one a pair of the groups that export, and who they are.
+  Exports exports;
+  std::size_t export_count() const { return export_count_; }
+  template <class Visit>
+  void for_each_export(Visit&& visit) const {  // visit(particle, place in exports)
+    for (const auto& group : groups_)
+      if (group.exports)
+        for (std::size_t c = 0; c < group.size; ++c) visit(group.j[c], group.first_export + c);
+  }
+  template <class Visit>
+  void for_each(Visit&& visit) const {  // visit(i, j)
+    for (const auto& group : groups_)
+      for (std::size_t c = 0; c < group.size; ++c) visit(group.i[c], group.j[c]);
+  }
+  std::size_t size() const;
+  std::size_t bytes() const;
+
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("groups", groups_);
+    archive("export_count", export_count_);
+    exports.force.resize(export_count_);
+    exports.torque.resize(export_count_);
+  }
+
+ private:
+  // Of group g: its own pairs at 2 g, those that export at 2 g + 1.
+  std::vector<PairContacts> groups_, earlier_;
+  std::size_t export_count_ = 0;
+};
+
+}  // namespace acopla::dem
