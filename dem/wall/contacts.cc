@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cassert>
+#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -29,6 +29,8 @@ double number(const std::vector<HistoryLane>& history, std::size_t numbers, std:
       "contact is too soft for this load: raise the particles' stiffness or lower the speed.",
       particles.id[i], walls.walls()[walls.wall_of(element)].name, time, x[0], x[1], x[2]));
 }
+
+Record record_of(const Vec3& vector) { return {vector[0], vector[1], vector[2], 0}; }
 
 // A centre this near to a surface, over the radius, has gone through it.
 constexpr double least_distance = 0.05;
@@ -72,9 +74,10 @@ WallContactList::Group& WallContactList::group_of(const KernelTable& kernels, co
 // that never share a crease, and none with the others. The flat ones are left in flats_.
 bool WallContactList::find_lone(const WallSet& walls, const Record& position, double travel, std::span<const std::uint32_t> elements) {
   const Vec3 centre = position.vector();
+  const auto way = [&](std::uint32_t element) { return travel * walls.travel_ratio(walls.wall_of(element), position.w); };
   flats_.clear();
   for (const auto element : elements)
-    if (walls.is_plane(element) || walls.holds_foot(element, centre, travel)) flats_.push_back(element);
+    if (walls.is_plane(element) || walls.holds_foot(element, centre, way(element))) flats_.push_back(element);
   for (std::size_t a = 0; a < flats_.size(); ++a)
     for (std::size_t b = a + 1; b < flats_.size(); ++b) {
       const auto wall_a = walls.wall_of(flats_[a]), wall_b = walls.wall_of(flats_[b]);
@@ -90,11 +93,26 @@ bool WallContactList::find_lone(const WallSet& walls, const Record& position, do
   for (const auto element : elements) {
     if (std::find(flats_.begin(), flats_.end(), element) != flats_.end()) continue;
     const bool yields = std::any_of(flats_.begin(), flats_.end(), [&](std::uint32_t flat) {
-      return walls.is_facet(flat) && walls.yields_to(element, flat, centre, travel);
+      return walls.is_facet(flat) && walls.yields_to(element, flat, centre, way(element));
     });
     if (!yields) return false;
   }
   return true;
+}
+
+void WallContactList::sort_by_wall(const WallSet& walls, Group& group) {
+  std::vector<std::uint32_t> order(group.lone.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t k, std::uint32_t l) {
+    const auto &a = group.lone[k], &b = group.lone[l];
+    return std::tuple(walls.wall_of(a.element), a.particle, a.element) < std::tuple(walls.wall_of(b.element), b.particle, b.element);
+  });
+  const auto lone = group.lone;
+  const auto flats = group.flats;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    group.lone[k] = lone[order[k]];
+    group.flats[k] = flats[order[k]];
+  }
 }
 
 void WallContactList::find(const KernelTable& kernels, const WallSet& walls, const Particles& particles, std::uint32_t first, std::uint32_t last,
@@ -132,7 +150,9 @@ void WallContactList::find(const KernelTable& kernels, const WallSet& walls, con
           const Record now = walls.to_world(walls.wall_of(element), flat);
           if (now.vector().dot(position.vector()) < now.w) flat = {-flat.x, -flat.y, -flat.z, -flat.w};
         }
-        group(element).lone.push_back({flat, i, element});
+        auto& chosen = group(element);
+        chosen.lone.push_back({i, element});
+        chosen.flats.push_back(flat);
       }
       continue;
     }
@@ -142,10 +162,9 @@ void WallContactList::find(const KernelTable& kernels, const WallSet& walls, con
     start_.push_back(static_cast<std::uint32_t>(elements_.size()));
   }
   for (auto& group : groups_) {
+    group.turns = group.turns && group.moves;
     // Wall by wall, so that loads are summed in registers.
-    std::sort(group.lone.begin(), group.lone.end(), [&](const Lone& a, const Lone& b) {
-      return std::tuple(walls.wall_of(a.element), a.particle, a.element) < std::tuple(walls.wall_of(b.element), b.particle, b.element);
-    });
+    sort_by_wall(walls, group);
     std::sort(group.balls.begin(), group.balls.end(),
               [](const Near& a, const Near& b) { return std::pair(a.particle, a.element) < std::pair(b.particle, b.element); });
     const auto size = (group.capacity() + lanes) / lanes * lanes;  // one spare at least: contacts are written before it is known that they are any
@@ -197,10 +216,10 @@ void WallContactList::restore(const WallSet& walls, const Particles& particles, 
     return nothing;
   };
   // Where a particle has just left an element for the inside of another, see inherit().
-  const auto left_behind = [&](const Lone& lone) {
+  const auto left_behind = [&](const Near& lone, const Record& body_flat) {
     const auto [first, last] = of_particle(particles.id[lone.particle]);
     const auto wall = walls.wall_of(lone.element);
-    const Record flat = walls.to_world(wall, lone.flat);
+    const Record flat = walls.to_world(wall, body_flat);
     const auto& position = particles.position[lone.particle];
     const Vec3 foot = position.vector() - (flat.vector().dot(position.vector()) - flat.w) * flat.vector();
     for (auto s = first; s < last; ++s)
@@ -216,7 +235,7 @@ void WallContactList::restore(const WallSet& walls, const Particles& particles, 
     std::vector<std::size_t> origin(group.lone.size());
     for (std::size_t k = 0; k < group.lone.size(); ++k) origin[k] = same(group.lone[k].particle, group.lone[k].element);
     for (std::size_t k = 0; k < group.lone.size(); ++k)
-      if (origin[k] == nothing) origin[k] = left_behind(group.lone[k]);
+      if (origin[k] == nothing) origin[k] = left_behind(group.lone[k], group.flats[k]);
     std::size_t c = 0;
     const auto add = [&](std::size_t key, std::uint32_t particle, std::size_t s) {
       if (s == nothing || saved.contacts[s].size != group.numbers) return false;
@@ -236,7 +255,7 @@ void WallContactList::restore(const WallSet& walls, const Particles& particles, 
           if (walls.walls()[walls.wall_of(elements_[e])].material != group.wall_material) continue;
           const auto s = same(near_[f], elements_[e]);
           if (add(group.first_ruled_key() + e, near_[f], s))
-            group.detail[c - 1 - group.first_ruled] = {saved.contacts[s].point, saved.contacts[s].normal, {}, elements_[e], f};
+            group.detail[c - 1 - group.first_ruled] = {record_of(saved.contacts[s].point), record_of(saved.contacts[s].normal), {}, elements_[e], f};
         }
     group.contacts.size = c;
   }
@@ -271,7 +290,7 @@ void WallContactList::touch_lone(Group& group, const WallSet& walls, const Parti
   for (std::size_t k = 0; k < group.lone.size(); ++k) {
     const auto& lone = group.lone[k];
     const auto& x = position[lone.particle];
-    Record flat = lone.flat;
+    Record flat = group.flats[k];
     Vec3 velocity = Vec3::Zero();
     if (group.moves) {
       const auto wall = walls.wall_of(lone.element);
@@ -286,14 +305,16 @@ void WallContactList::touch_lone(Group& group, const WallSet& walls, const Parti
     contacts.particle[count] = lone.particle;
     contacts.normal[count] = {flat.x, flat.y, flat.z, overlap};
     if (fills_velocity) contacts.velocity[count] = {velocity[0], velocity[1], velocity[2], 1};
+    if (group.curved) contacts.curvature[count] = 0;
     group.key[count] = static_cast<std::uint32_t>(k);
     count += overlap > 0;
     through |= !(height > least_distance * x.w);
   }
   contacts.size = count;
   if (!through) return;
-  for (const auto& lone : group.lone) {
-    const auto flat = walls.to_world(walls.wall_of(lone.element), lone.flat);
+  for (std::size_t k = 0; k < group.lone.size(); ++k) {
+    const auto& lone = group.lone[k];
+    const auto flat = walls.to_world(walls.wall_of(lone.element), group.flats[k]);
     const auto& x = position[lone.particle];
     if (!(flat.x * x.x + flat.y * x.y + flat.z * x.z - flat.w > least_distance * x.w)) stop_at_wall(walls, particles, lone.particle, lone.element, time);
   }
@@ -355,7 +376,7 @@ void WallContactList::add_by_rules(const WallSet& walls, std::uint8_t particle_m
   contacts.velocity[c].w = weight;
   if (group.turns) contacts.wall_spin[c].set(walls.spin_of(contact.element));
   if (group.curved) contacts.curvature[c] = 0;
-  group.detail[c - group.first_ruled] = {contact.point, contact.normal, contact.weights, contact.element, near};
+  group.detail[c - group.first_ruled] = {record_of(contact.point), record_of(contact.normal), contact.weights, contact.element, near};
 }
 
 // Spare lanes repeat the last contact. Histories stay where they are while the contacts are the same.
@@ -418,8 +439,8 @@ void WallContactList::inherit(Group& group, const WallSet& walls, double radius,
     double nearest = radius * radius;
     for (auto b = first_before; b < last_before; ++b) {
       const auto &mine = detail(c), &left = detail_before(b);
-      const double square = (left.point - mine.point).squaredNorm();
-      if (!used_[b - first_before] && square < nearest && left.normal.dot(mine.normal) > 0.5 &&
+      const double square = (left.point.vector() - mine.point.vector()).squaredNorm();
+      if (!used_[b - first_before] && square < nearest && left.normal.vector().dot(mine.normal.vector()) > 0.5 &&
           walls.wall_of(left.element) == walls.wall_of(mine.element)) {
         nearest = square;
         origin_[c] = b;
@@ -431,7 +452,7 @@ void WallContactList::inherit(Group& group, const WallSet& walls, double radius,
   }
   const auto nearest_point = [&](std::size_t c) {
     NearestPoint contact;
-    contact.normal = detail(c).normal;
+    contact.normal = detail(c).normal.vector();
     contact.distance = radius - group.contacts.normal[c].w;
     return contact;
   };

@@ -69,25 +69,17 @@ class WallContactList {
     archive("elements", elements_);
     archive("place", place_);
     archive("materials", materials_);
-    std::size_t count = groups_.size();
-    archive("groups", count);
-    groups_.resize(count);
-    for (auto& group : groups_) group.state(archive);
+    archive("groups", groups_);
     archive("resultants", resultants_);
   }
 
  private:
-  // A particle over the inside of a plane or facet.
-  struct Lone {
-    Record flat;  // normal on the particle's side, and normal · x on it; in body axes
-    std::uint32_t particle, element;
-  };
   struct Near {
     std::uint32_t particle, element;
   };
   // What a contact by the rules leaves for the next step and for the loads.
   struct Detail {
-    Vec3 point, normal;
+    Record point, normal;
     std::array<double, 3> weights;
     std::uint32_t element, near;  // near: place in near_
   };
@@ -97,7 +89,8 @@ class WallContactList {
     std::uint8_t particle_material = 0, wall_material = 0;
     bool moves = false, turns = false, curved = false;  // some wall of its candidates
     std::size_t numbers = 0;                            // a history has
-    std::vector<Lone> lone;
+    std::vector<Near> lone;     // particles over the inside of a plane or facet
+    std::vector<Record> flats;  // of each: normal on the particle's side, and normal · x on it; in body axes
     std::vector<Near> balls;
     std::size_t ruled = 0;  // candidates by the rules
     WallContacts contacts;
@@ -122,6 +115,7 @@ class WallContactList {
       archive("curved", curved);
       archive("numbers", numbers);
       archive("lone", lone);
+      archive("flats", flats);
       archive("balls", balls);
       archive("ruled", ruled);
       archive("particle", contacts.particle);
@@ -142,7 +136,8 @@ class WallContactList {
 
   Group& group_of(const KernelTable& kernels, const WallSet& walls, std::uint8_t particle_material, std::uint8_t wall_material);
   bool find_lone(const WallSet& walls, const Record& position, double travel, std::span<const std::uint32_t> elements);
-  void start_step(Group& group);
+  static void sort_by_wall(const WallSet& walls, Group& group);
+  static void start_step(Group& group);
   void touch_lone(Group& group, const WallSet& walls, const Particles& particles, double time);
   void touch_balls(Group& group, const WallSet& walls, const Particles& particles, double time);
   void touch_by_rules(const WallSet& walls, const Particles& particles, double time);

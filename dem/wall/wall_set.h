@@ -113,8 +113,7 @@ class WallSet {
 
   /// Lists of contacts are made now.
   /// @param low, high  box that holds all particles' centres [m]: how far a plane that turns can matter
-  /// @param largest_radius  of the particles [m]
-  void mark(const Vec3& low, const Vec3& high, double largest_radius);
+  void mark(const Vec3& low, const Vec3& high);
   /// Bound of how far any point of any wall that particles in the marked box may touch has moved since mark() [m].
   double travel_since_mark() const;
 
@@ -144,16 +143,8 @@ class WallSet {
     archive("time", time_);
     archive("servos", servos_);
     archive("marks", marks_);
-    for (auto& motion : prescribed_) {
-      archive("position", motion.position);
-      archive("velocity", motion.velocity);
-      archive("marked", motion.marked);
-      archive("start", motion.start);
-      archive("fastest", motion.fastest);
-      archive("travel", motion.travel);
-      archive("travel_time", motion.travel_time);
-    }
-    restore();
+    archive("prescribed", prescribed_);
+    if constexpr (Archive::reading) restore();
   }
 
   // What the contact lists need to know of elements.
@@ -178,6 +169,11 @@ class WallSet {
   Record to_world(std::size_t wall, const Record& flat) const;
   /// Barycentric weights of the foot of a point in body axes on a facet of a wall that does not deform; negative beyond an edge.
   std::array<double, 3> foot_weights(std::uint32_t facet, const Vec3& body) const;
+  /// How far a particle that touches a wall moves in the wall's body axes while travel_since_mark() grows by 1: on a mesh that turns it is
+  /// by its radius farther from the axis than the wall's own points.
+  double travel_ratio(std::size_t wall, double radius) const {
+    return frames_[wall].turns && !walls_[wall].is_plane ? 1 + radius / extent_[wall] : 1;
+  }
   /// The foot of `centre` lies inside the facet, and does so wherever the centre moves by `travel`. Never for walls that deform.
   bool holds_foot(std::uint32_t facet, const Vec3& centre, double travel) const;
   /// The nearest point of `facet` lies on an edge or vertex that it shares with `other`, and does so wherever the centre moves by
@@ -222,11 +218,29 @@ class WallSet {
   struct Mark {
     Vec3 displacement = Vec3::Zero();
     double angle = 0, reach = 0;  // reach: farthest point from the axis that matters [m]
+
+    template <class Archive>
+    void state(Archive& archive) {
+      archive("displacement", displacement);
+      archive("angle", angle);
+      archive("reach", reach);
+    }
   };
   struct Prescribed {
     std::vector<Vec3> position, velocity, marked;  // at `start`; at the last mark
     double start = 0, fastest = 0;                 // largest |velocity|
     double travel = 0, travel_time = 0;            // largest distance from `marked` at that time
+
+    template <class Archive>
+    void state(Archive& archive) {
+      archive("position", position);
+      archive("velocity", velocity);
+      archive("marked", marked);
+      archive("start", start);
+      archive("fastest", fastest);
+      archive("travel", travel);
+      archive("travel_time", travel_time);
+    }
   };
 
   std::size_t ball_index(std::uint32_t element) const { return element - facets_.size() - planes_.size(); }
