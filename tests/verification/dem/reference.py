@@ -320,7 +320,8 @@ def on_floor(body, end, rtol, refinement, samples=(), speed=0.0, spin=0.0, slope
     longest = 0.25 / fastest / refinement  # short enough that no switch is stepped over
     pending, log, taken, turns = list(samples), [], [], []
     for _ in range(100000):
-        parts = [(part, what, function, direction) for part, found in ((friction, friction.switches(force, slip)), (rolling, rolling.switches(couple, turn)))
+        parts = [(part, what, function, direction) for part, found in ((friction, friction.switches(force, slip)),
+                                                                       (rolling, rolling.switches(couple, turn)))
                  for function, direction, what in found]
         before = t
         t, state, hit, path = integrate(rates, state, t, end, [(p[2], p[3]) for p in parts], longest, rtol)
@@ -353,7 +354,8 @@ def elastic_collision():
 
     def outgoing(w):
         v1, v2 = np.array([speed / 2, 0]) + w / 2, np.array([speed / 2, 0]) - w / 2
-        return {"speed_1": list(map(float, v1)), "speed_2": list(map(float, v2)), "angle_1_degrees": float(np.degrees(np.arctan2(v1[1], v1[0]))),
+        return {"speed_1": list(map(float, v1)), "speed_2": list(map(float, v2)),
+                "angle_1_degrees": float(np.degrees(np.arctan2(v1[1], v1[0]))),
                 "angle_2_degrees": float(np.degrees(np.arctan2(v2[1], v2[0])))}
 
     def soft(stiffness):
@@ -402,7 +404,8 @@ def struck_ball():
                 body = {"mass": mass, "inertia": beta * mass * radius**2, "radius": radius, "lever": radius, "k_t": 3.3e3 * factor,
                         "c_t": 12.6 * np.sqrt(factor), "mu": mu, "k_r": 0.0, "c_r": 0.0, "mu_r": 0.0, "capped": rule == "capped"}
                 def run(rtol, refinement):
-                    log, samples, _, last = on_floor(body, 0.2, rtol, refinement, (0.002, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.05, 0.2), speed, spin)
+                    log, samples, _, last = on_floor(body, 0.2, rtol, refinement, (0.002, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.05, 0.2),
+                                                     speed, spin)
                     slides = [e for e in log if "slide" in e[1]]
                     sticks = [e for e in log if e[1] == "friction stick"]
                     first = sticks[0] if sticks else [None] * 7
@@ -440,7 +443,8 @@ def roll(body, end, samples=()):
         stick = next((e for e in log if e[1] == "friction stick"), None)
         slides = [e[0] for e in log if e[1].startswith("rolling slide")]
         return {"slip_first_ends": stick and stick[0], "rolling_limit_first_reached": slides[0] if slides else None,
-                "first_standstill": turns[0] if turns else None, "turning_points": turns[:6], "largest_distance": max([x for _, x in turns] + [float(last[0])]),
+                "first_standstill": turns[0] if turns else None, "turning_points": turns[:6],
+                "largest_distance": max([x for _, x in turns] + [float(last[0])]),
                 "distance_at_end": float(last[0]), "speed_at_end": float(last[1]) if abs(last[1]) > 1e-9 else 0.0, "end": end,
                 "samples_t_x_v_w_force_couple": taken}
     return twice(run)
@@ -477,10 +481,12 @@ def rolling_consistent():
         worst = max(worst, error)
     return {"source": "Gomes (2014) 3.2.3, table 3.3 read with r = 0.005 m; figures 3.9-3.11",
             "parameters": {"radius": radius, "density": density, "speed": 1.0, "friction": mu, "rolling_friction": mu_r, "eta_r": eta,
-                           "normal_stiffness": 6.5e4, "tangential_stiffness": 3250.0, "tangential_damping": 5.7, "rolling_stiffness": 0.08125,
+                           "normal_stiffness": 6.5e4, "tangential_stiffness": 3250.0, "tangential_damping": 5.7,
+                           "rolling_stiffness": 0.08125,
                            "rolling_damping": rolling_body(0.5, mass, radius, 1, 1, 0.08125, eta, mu, mu_r, False)["c_r"],
                            "mass": mass, "normal_force": mass * G, "static_overlap": mass * G / 6.5e4,
-                           "sphere": "springs and dashpots times m_sphere/m_disc per metre = 4 r/3", "stiffness_x100": "k x 100, dashpots x 10",
+                           "sphere": "springs and dashpots times m_sphere/m_disc per metre = 4 r/3",
+                           "stiffness_x100": "k x 100, dashpots x 10",
                            "initial": "settled on the floor, then v = 1 m/s, no spin, friction and rolling springs at zero"},
             "values": values, "converged": worst}
 
@@ -498,7 +504,8 @@ def rolling_printed():
                 values[key], error = roll(body, 6.0 if radius == 0.05 else 1.0, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0))
                 worst = max(worst, error)
     return {"source": "Gomes (2014) table 3.3: k_t 3.3e3, k_r 8.1e-2, c_t 5.7, c_r 0.004, mu 0.8, mu_r 0.2",
-            "parameters": {"density": 1056.0, "normal_stiffness": 6.5e4, "speed": 1.0, "lever": "radius"}, "values": values, "converged": worst}
+            "parameters": {"density": 1056.0, "normal_stiffness": 6.5e4, "speed": 1.0, "lever": "radius"}, "values": values,
+            "converged": worst}
 
 
 @case
@@ -522,9 +529,10 @@ def incline():
                 "stays": ratio <= 1}
             worst = max(worst, error)
     return {"source": "Gomes (2014) 2.57, figure 2.9(b); Ai et al. (2011)",
-            "parameters": {"radius": radius, "density": density, "friction": mu, "rolling_friction": mu_r, "eta_r": eta, "tangential_stiffness": 3250.0,
+            "parameters": {"radius": radius, "density": density, "friction": mu, "rolling_friction": mu_r, "eta_r": eta,
+                           "tangential_stiffness": 3250.0,
                            "rolling_stiffness": 0.08125, "tangential_damping": 5.7, "sphere": "springs and dashpots times 4 r/3",
-                           "initial": "settled overlap m g cos(slope)/k_n, released at rest with friction and rolling springs at zero; capped"},
+                           "initial": "settled overlap m g cos(slope)/k_n, released at rest, friction and rolling springs at zero; capped"},
             "values": values, "converged": worst}
 
 
@@ -552,7 +560,8 @@ def hertz_impact(b, rtol=1e-13, refinement=1.0):
     alpha = np.sqrt(5) * b
     force = lambda x, v: x**1.5 + alpha * x**0.25 * v
     middle = 0.3
-    first = solve_ivp(lambda q, y: [-(q**6 + alpha * q * y[0]) * 4 * q**3 / y[0], 4 * q**3 / y[0]], (0, middle), [1.0, 0.0], method="DOP853",
+    first = solve_ivp(lambda q, y: [-(q**6 + alpha * q * y[0]) * 4 * q**3 / y[0], 4 * q**3 / y[0]], (0, middle), [1.0, 0.0],
+                      method="DOP853",
                       rtol=rtol, atol=rtol * 1e-3, max_step=0.01 / refinement, events=None)
     v, t = first.y[:, -1]
     rates = lambda _, y: [y[1], -force(max(y[0], 1e-300), y[1])]
@@ -566,7 +575,7 @@ def hertz_impact(b, rtol=1e-13, refinement=1.0):
 
 @case
 def restitution():
-    """No-tension inversion: damping ratio for e (linear: zeta; Hertz: Tsuji's beta, the same number), and what the printed formula returns."""
+    """No-tension inversion: damping ratio for e (linear zeta = Tsuji's beta of Hertz), and what the printed formula returns."""
     values, worst = {}, 0.0
     for e in (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0):
         zeta, printed = damping_ratio_for(e), printed_damping_ratio(e)
@@ -607,9 +616,11 @@ def hertz_head_on():
                            "shear_modulus": [e1 / 2 / (1 + nu1), e2 / 2 / (1 + nu2)], "closing_speed": speed},
             "values": {"reduced_mass": mass, "reduced_radius": radius, "reduced_modulus": young, "hertz_stiffness": stiffness,
                        "peak_overlap": peak, "peak_force": stiffness * peak**1.5, "duration": hertz_duration() * peak / speed,
-                       "duration_constant": hertz_duration(), "peak_constant": HERTZ_PEAK, "duration_in_impact_units": hertz_duration() * HERTZ_PEAK,
+                       "duration_constant": hertz_duration(), "peak_constant": HERTZ_PEAK,
+                       "duration_in_impact_units": hertz_duration() * HERTZ_PEAK,
                        "rebound_speed_of_1": speed * m2 / (m1 + m2), "energy_stored_at_peak": mass * speed**2 / 2,
-                       "integrated_over_closed": {"peak": numeric["peak_overlap"] / HERTZ_PEAK, "duration": numeric["duration"] / hertz_duration() / HERTZ_PEAK}},
+                       "integrated_over_closed": {"peak": numeric["peak_overlap"] / HERTZ_PEAK,
+                                                  "duration": numeric["duration"] / hertz_duration() / HERTZ_PEAK}},
             "converged": 1e-11}
 
 
@@ -620,7 +631,8 @@ def free_vibration():
     mass, _ = sphere(radius, density)
     omega = np.sqrt(stiffness / mass)
     rest = mass * G / stiffness
-    values = {"mass": mass, "static_overlap": rest, "angular_frequency": omega, "period": 2 * np.pi / omega, "amplitude_undamped": speed / omega,
+    values = {"mass": mass, "static_overlap": rest, "angular_frequency": omega, "period": 2 * np.pi / omega,
+              "amplitude_undamped": speed / omega,
               "stays_in_contact": bool(speed / omega < rest)}
     for zeta in (0.0, 0.1, 0.5):
         damped = omega * np.sqrt(1 - zeta**2)
@@ -662,7 +674,8 @@ def bouncing_ball():
                 state, start = np.array([0.0, speed]), touch
             start, state, _, _ = integrate(rates, state, start, start + 1e3 * unit, [(lambda y: y[1], -1)], longest, rtol)
             peak = state[0]
-            leave, state, hit, _ = integrate(rates, state, start, start + 20 * unit, [(lambda y: force(y) if zeta else y[0], -1)], longest, rtol)
+            leave, state, hit, _ = integrate(rates, state, start, start + 20 * unit, [(lambda y: force(y) if zeta else y[0], -1)], longest,
+                                             rtol)
             rise = -state[1] / G
             if hit is None or -state[0] + state[1] ** 2 / (2 * G) <= 0:  # too slow to clear the floor again: it settles
                 break
@@ -676,7 +689,8 @@ def bouncing_ball():
     for e in (1.0, 0.8, 0.5, 0.3):
         zeta = damping_ratio_for(e)
         values[f"rigid_e_{e:g}"] = {"heights": [gap * e ** (2 * n) for n in (1, 2, 3, 4)]}
-        for law, stiffness in (("linear", 1e4), ("linear", 1e6), ("hertz", hertz_stiffness(radius, 1e7)), ("hertz", hertz_stiffness(radius, 1e9))):
+        for law, stiffness in (("linear", 1e4), ("linear", 1e6), ("hertz", hertz_stiffness(radius, 1e7)),
+                               ("hertz", hertz_stiffness(radius, 1e9))):
             found, error = twice(lambda rtol, refinement: bounces(law, stiffness, zeta, rtol, refinement))
             values[f"{law}_{stiffness:.3g}_e_{e:g}"] = found | {"stiffness": stiffness, "damping_ratio": zeta}
             worst = max(worst, error)
@@ -696,8 +710,10 @@ def oblique_impact():
     closed = {}
     for e in (1.0,):
         impulse = mu * (1 + e) * mass * speed
-        closed[f"e_{e:g}"] = {"normal_impulse": (1 + e) * mass * speed, "tangential_impulse": impulse, "tangential_speed": slip - impulse / mass,
-                              "spin": -impulse * radius / inertia, "spin_lever_at_half_overlap": -(impulse * (radius - np.pi / 8 * speed / omega)) / inertia,
+        closed[f"e_{e:g}"] = {"normal_impulse": (1 + e) * mass * speed, "tangential_impulse": impulse,
+                              "tangential_speed": slip - impulse / mass,
+                              "spin": -impulse * radius / inertia,
+                              "spin_lever_at_half_overlap": -(impulse * (radius - np.pi / 8 * speed / omega)) / inertia,
                               "slip_after": slip - impulse * (1 / mass + radius**2 / inertia), "peak_overlap": speed / omega}
     sticking_limit = max(ratio * mu, 2 * mu * (1 + mass * radius**2 / inertia))
 
@@ -713,7 +729,8 @@ def oblique_impact():
         longest, log = 0.02 / omega / refinement, []
         for _ in range(100):
             held = lambda y: sliding * mu * normal(y) if sliding else y[4]
-            rates = lambda _, y: [y[1], -normal(y) / mass, held(y) / mass, held(y) * radius / inertia, (sliding * mu * growth(y)) if sliding else -k_t * surface(y)]
+            rates = lambda _, y: [y[1], -normal(y) / mass, held(y) / mass, held(y) * radius / inertia,
+                                  (sliding * mu * growth(y)) if sliding else -k_t * surface(y)]
             switches = [(lambda y: normal(y) if zeta else y[0], -1)]
             if sliding:
                 switches.append((lambda y: sliding * (-k_t * surface(y)) - mu * growth(y), -1))
@@ -737,7 +754,8 @@ def oblique_impact():
             worst = max(worst, error)
     return {"source": "Coulomb: tangential impulse = mu x normal impulse while it slides throughout; ODE with events for the rest",
             "parameters": {"radius": radius, "density": density, "normal_stiffness": stiffness, "stiffness_ratio": ratio, "friction": mu,
-                           "normal_speed": speed, "tangential_speed": slip, "slides_throughout_if_slip_over_normal_speed_exceeds": sticking_limit,
+                           "normal_speed": speed, "tangential_speed": slip,
+                           "slides_throughout_if_slip_over_normal_speed_exceeds": sticking_limit,
                            "lever": "radius; no tangential dashpot"},
             "values": values, "converged": worst}
 
@@ -749,14 +767,18 @@ def spin_decay():
     mass, inertia = sphere(radius, density)
     limit = limit_coefficient * radius * mass * G
     values, worst = {}, 0.0
-    for name, stiffness, reduced in (("torsion", k_t * radius**2, inertia), ("rolling_frictionless_floor", k_t * radius**2, inertia + mass * radius**2)):
+    for name, stiffness, reduced in (("torsion", k_t * radius**2, inertia),
+                                     ("rolling_frictionless_floor", k_t * radius**2, inertia + mass * radius**2)):
         dashpot = 2 * eta * np.sqrt(reduced * stiffness)
-        rigid = {"limit_couple": limit, "deceleration": limit / inertia, "stops_at": inertia * spin / limit, "angle": inertia * spin**2 / (2 * limit)}
+        rigid = {"limit_couple": limit, "deceleration": limit / inertia, "stops_at": inertia * spin / limit,
+                 "angle": inertia * spin**2 / (2 * limit)}
         for rule in ("printed", "capped"):
-            body = {"mass": mass, "inertia": inertia, "radius": radius, "lever": 0.0, "k_t": 0.0, "c_t": 0.0, "mu": 0.0, "k_r": stiffness, "c_r": dashpot,
+            body = {"mass": mass, "inertia": inertia, "radius": radius, "lever": 0.0, "k_t": 0.0, "c_t": 0.0, "mu": 0.0, "k_r": stiffness,
+                    "c_r": dashpot,
                     "mu_r": limit_coefficient, "capped": rule == "capped"}
             def run(rtol, refinement):
-                log, taken, _, last = on_floor(body, 1.2 * inertia * spin / limit, rtol, refinement, [f * inertia * spin / limit for f in (0.1, 0.25, 0.5, 0.75, 0.9)], 0.0, spin)
+                log, taken, _, last = on_floor(body, 1.2 * inertia * spin / limit, rtol, refinement,
+                                               [f * inertia * spin / limit for f in (0.1, 0.25, 0.5, 0.75, 0.9)], 0.0, spin)
                 return {"samples_t_w": [[s[0], s[3]] for s in taken], "stops_at": next(e[0] for e in log if e[1] == "rolling stick"),
                         "spin_at_end": float(last[2]) if abs(last[2]) > 1e-9 else 0.0}
             found, error = twice(run)
@@ -764,7 +786,8 @@ def spin_decay():
             worst = max(worst, error)
         values[name + "_rigid"] = rigid
     return {"source": "I w' = -T_m: w = w0 - T_m t / I; soft: the same law with its spring and dashpot",
-            "parameters": {"radius": radius, "density": density, "coefficient": limit_coefficient, "eta": eta, "spin": spin, "tangential_stiffness": k_t,
+            "parameters": {"radius": radius, "density": density, "coefficient": limit_coefficient, "eta": eta, "spin": spin,
+                           "tangential_stiffness": k_t,
                            "normal_force": mass * G}, "values": values, "converged": worst}
 
 
@@ -810,8 +833,10 @@ def statics():
     values["janssen_slot"] = {"decay_length": slot, "base_stress": bulk * G * slot * (1 - np.exp(-depth / slot)),
                               "base_force": bulk * G * slot * (1 - np.exp(-depth / slot)) * diameter, "weight": bulk * G * depth * diameter}
     return {"source": "equilibrium; Janssen (1895)",
-            "parameters": {"linear_stiffness": stiffness, "reduced_modulus_of_every_pair": young, "density": density, "order": "lowest first",
-                           "janssen": {"depth": depth, "width_or_diameter": diameter, "bulk_density": bulk, "wall_friction": mu, "lateral_stress_ratio": ratio}},
+            "parameters": {"linear_stiffness": stiffness, "reduced_modulus_of_every_pair": young, "density": density,
+                           "order": "lowest first",
+                           "janssen": {"depth": depth, "width_or_diameter": diameter, "bulk_density": bulk, "wall_friction": mu,
+                                       "lateral_stress_ratio": ratio}},
             "values": values, "converged": 1e-12}
 
 
@@ -843,7 +868,8 @@ def orders():
     for zeta in (0.0, 0.1, 0.5):  # never leaves the spring
         end, damped = 2.3 * 2 * np.pi, np.sqrt(1 - zeta**2)
         exact = np.exp(-zeta * end) / damped * np.sin(damped * end)
-        errors = [abs(march(lambda x, v: -x - 2 * zeta * v, np.array([0.0]), np.array([1.0]), end / (4 * n), 4 * n)[0][0] - exact) for n in counts]
+        errors = [abs(march(lambda x, v: -x - 2 * zeta * v, np.array([0.0]), np.array([1.0]), end / (4 * n),
+                            4 * n)[0][0] - exact) for n in counts]
         values[f"smooth_contact_zeta_{zeta:g}"] = {"expected": 2.0, "observed": observed(errors)}
 
     for half_step, expected in ((False, 1.0), (True, 2.0)):  # tangential spring that grows by increments
@@ -855,10 +881,12 @@ def orders():
                 f -= step * (v + a * step * (0.5 if half_step else 1.0))
                 v, a = v + 0.5 * (a + f) * step, f
             errors.append(abs(-f - np.sin(end)))
-        values["incremental_spring_" + ("half_step_velocity" if half_step else "predicted_velocity")] = {"expected": expected, "observed": observed(errors)}
+        values["incremental_spring_" + ("half_step_velocity" if half_step else "predicted_velocity")] = {"expected": expected,
+                                                                                                         "observed": observed(errors)}
 
     phases = (np.arange(256) + 0.5) / 256
-    for name, zeta, p, q in (("linear_e_1", 0.0, 1.0, 0.0), ("linear_e_0.5", damping_ratio_for(0.5), 1.0, 0.0), ("hertz_e_1", 0.0, 1.5, 0.25),
+    for name, zeta, p, q in (("linear_e_1", 0.0, 1.0, 0.0), ("linear_e_0.5", damping_ratio_for(0.5), 1.0, 0.0),
+                             ("hertz_e_1", 0.0, 1.5, 0.25),
                              ("hertz_e_0.5", damping_ratio_for(0.5), 1.5, 0.25)):
         c = 2 * zeta if q == 0 else np.sqrt(5) * zeta
         def force(x, v):
@@ -875,7 +903,8 @@ def orders():
                                     "observed_rms": observed(rms), "observed_mean": observed(mean),
                                     "rms_error_at_steps_per_half_period": dict(zip(map(str, counts[1:]), map(float, rms)))}
     return {"source": "the integrator of README on scalar contacts; impacts start at 256 phases of the step",
-            "parameters": {"steps_per_half_period": counts, "columns": "log2 of the error ratio when the step is halved"}, "values": values, "converged": 1e-6}
+            "parameters": {"steps_per_half_period": counts, "columns": "log2 of the error ratio when the step is halved"},
+            "values": values, "converged": 1e-6}
 
 
 # --- piles --------------------------------------------------------------------------------------------------------------
@@ -941,7 +970,8 @@ def free_pile(mu_r, copies=8, end=4.0, step=1e-4, radius=0.005):
         x += step * v
     kinetic = 0.5 * mass * (v**2).sum((1, 2)) + 0.5 * inertia * (w**2).sum(1)
     return {"highest_centre_over_r": list(x[..., 1].max(1) / radius), "width_over_r": list((x[..., 0].max(1) - x[..., 0].min(1)) / radius),
-            "mean_height_over_r": list(x[..., 1].mean(1) / radius), "discs_off_the_floor": [int(c) for c in (x[..., 1] > 1.5 * radius).sum(1)],
+            "mean_height_over_r": list(x[..., 1].mean(1) / radius),
+            "discs_off_the_floor": [int(c) for c in (x[..., 1] > 1.5 * radius).sum(1)],
             "kinetic_energy": list(kinetic)}
 
 
@@ -951,7 +981,8 @@ def free_pile_statistics():
     values = {}
     for mu_r in (0.2, 0.0):
         found = free_pile(mu_r, end=3.0)
-        values[f"mu_r_{mu_r:g}"] = {key: {"least": min(x), "mean": float(np.mean(x)), "most": max(x)} for key, x in found.items() if key != "kinetic_energy"} | {
+        values[f"mu_r_{mu_r:g}"] = {key: {"least": min(x), "mean": float(np.mean(x)), "most": max(x)} for key,
+                                    x in found.items() if key != "kinetic_energy"} | {
             "largest_kinetic_energy": max(found["kinetic_energy"])}
     return {"source": "free_pile in reference.py: leapfrog, step 1e-4 s, 3 s, eight copies with jitter 0.01 r",
             "parameters": {"reads": "over the eight copies; widths are between outermost centres"}, "values": values, "converged": 0.05}
@@ -962,7 +993,8 @@ def piles():
     """Gomes (2014) 3.3: parameters of the two pile tests, with the geometry the text does not give chosen here."""
     def restitution_behind(dashpot, mass, stiffness):
         zeta = dashpot / (2 * np.sqrt(mass * stiffness))
-        return {"damping_ratio": zeta, "restitution_of_printed_formula": np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), "restitution_without_tension": restitution_of(zeta)}
+        return {"damping_ratio": zeta, "restitution_of_printed_formula": np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)),
+                "restitution_without_tension": restitution_of(zeta)}
 
     free_mass = disc(0.005, 1056.0)[0]
     barrier_mass = disc(0.006, 1056.0)[0]
@@ -973,17 +1005,25 @@ def piles():
                                "toe_distance": np.sqrt(2 * solid / fraction / np.tan(np.radians(angle)))} for angle in (20.5, 21.0, 28.0)}
     return {"source": "Gomes (2014) 3.3.1-3.3.2, tables 3.4-3.7; angles 28, 20.5 degrees, experiment of Li et al. (2005) 21 degrees",
             "parameters": {
-                "free_pile": {"radius": 0.005, "density": 1056.0, "count": 25, "normal_stiffness": 6.5e4, "tangential_stiffness": 3.25e3, "normal_damping": 36.5,
-                              "tangential_damping": 5.7, "friction": 0.8, "rolling_friction": 0.2, "eta_r": 0.6, "global_damping": [1e-4, 1e-5],
+                "free_pile": {"radius": 0.005, "density": 1056.0, "count": 25, "normal_stiffness": 6.5e4, "tangential_stiffness": 3.25e3,
+                              "normal_damping": 36.5,
+                              "tangential_damping": 5.7, "friction": 0.8, "rolling_friction": 0.2, "eta_r": 0.6,
+                              "global_damping": [1e-4, 1e-5],
                               "paper_step": 1e-5, "paper_end": 10.0},
-                "barrier": {"density_implied_by_c_n": 1056.0, "normal_stiffness": 1.02e6, "tangential_stiffness": 5.09e4, "normal_damping": 173.4,
-                            "tangential_damping": 27.7, "friction": 0.4, "rolling_friction": 0.1, "eta_r": 0.3, "global_damping": [6.7e-5, 6.7e-6],
+                "barrier": {"density_implied_by_c_n": 1056.0, "normal_stiffness": 1.02e6, "tangential_stiffness": 5.09e4,
+                            "normal_damping": 173.4,
+                            "tangential_damping": 27.7, "friction": 0.4, "rolling_friction": 0.1, "eta_r": 0.3,
+                            "global_damping": [6.7e-5, 6.7e-6],
                             "paper_step": 1e-5, "settling": 2.0, "lift_speed": 0.01, "lift_time": 15.0, "rest": 2.0,
-                            "groups_420": [[0.013, 105], [0.012, 210], [0.011, 105]], "groups_15000": [[0.0022, 3750], [0.002, 7500], [0.0018, 3750]],
-                            "chosen_column_width": width, "chosen_floor_length": 0.8, "chosen_wall_height": 0.6, "chosen_barrier_thickness": "none (a line)"}},
+                            "groups_420": [[0.013, 105], [0.012, 210], [0.011, 105]],
+                            "groups_15000": [[0.0022, 3750], [0.002, 7500], [0.0018, 3750]],
+                            "chosen_column_width": width, "chosen_floor_length": 0.8, "chosen_wall_height": 0.6,
+                            "chosen_barrier_thickness": "none (a line)"}},
             "values": {"free_pile_positions_without_jitter": pile_positions(0.005, 1, 0.0)[0],
-                       "free_pile": restitution_behind(36.5, free_mass, 6.5e4) | {"mass": free_mass, "sqrt_m_over_k": np.sqrt(free_mass / 6.5e4)},
-                       "barrier": restitution_behind(173.4, barrier_mass, 1.02e6) | {"mean_mass": barrier_mass, "solid_area_420": solid, "solid_area_15000": fine,
+                       "free_pile": restitution_behind(36.5, free_mass, 6.5e4) | {"mass": free_mass,
+                                                                                  "sqrt_m_over_k": np.sqrt(free_mass / 6.5e4)},
+                       "barrier": restitution_behind(173.4, barrier_mass, 1.02e6) | {"mean_mass": barrier_mass, "solid_area_420": solid,
+                                                                                     "solid_area_15000": fine,
                                                                                      "fill_height_at_solid_fraction_0.82": solid / fraction / width},
                        "triangle_against_the_wall_at_solid_fraction_0.82": triangle},
             "converged": ROUND_OFF}
