@@ -1,7 +1,7 @@
 // What a user may write wrong in a DEM table, and the sentence that answers.
 #include <gtest/gtest.h>
 
-#include "dem/insertion.h"
+#include "dem/feeding/insertion.h"
 #include "scenes.h"
 
 namespace acopla::dem::test {
