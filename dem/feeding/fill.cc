@@ -51,7 +51,8 @@ class Filler {
     std::vector<NewParticle> particles;
     for (std::size_t k = 0; k < fillings_.size(); ++k) {
       const auto& filling = fillings_[k];
-      if (filling.placing == Placing::given) particles.insert(particles.end(), filling.particles.begin(), filling.particles.end());
+      if (filling.placing == Placing::given)
+        particles.insert(particles.end(), filling.particles.begin(), filling.particles.end());
       else
         for (std::size_t i = 0; i < radii_[k].size(); ++i)
           particles.push_back({at_[k][i], radii_[k][i], filling.velocity, filling.spin, filling.material});
@@ -80,28 +81,33 @@ class Filler {
     const auto packing = grow_packing(*filling.region, radii_[k], random);
     const double target = solid_volume(radii_[k], settings_.dimension) / filling.region->volume();
     if (packing.jammed)
-      throw io::UserError(filling.where, fmt::format("{} of {:.4g} % solid cannot be packed into {}: growth jams at {:.4g} %. Random close "
-                                                     "packing of equal {}s is near {} %, and less between near walls. Ask for at most {:.4g} %.",
-                                                     filling.name, 100 * target, filling.region->text(), 100 * packing.solid_fraction,
-                                                     particle_word(settings_.dimension), settings_.dimension == 2 ? 84 : 64,
-                                                     std::floor(1000 * packing.solid_fraction) / 10));
+      throw io::UserError(
+          filling.where,
+          fmt::format("{} of {:.4g} % solid cannot be packed into {}: growth jams at {:.4g} %. Random close "
+                      "packing of equal {}s is near {} %, and less between near walls. Ask for at most {:.4g} %.",
+                      filling.name, 100 * target, filling.region->text(), 100 * packing.solid_fraction, particle_word(settings_.dimension),
+                      settings_.dimension == 2 ? 84 : 64, std::floor(1000 * packing.solid_fraction) / 10));
     at_[k] = packing.at;
     for (std::size_t i = 0; i < at_[k].size(); ++i)
       if (!is_free(at_[k][i], radii_[k][i]))
-        throw io::UserError(filling.where, fmt::format("{} grows in {}, where a wall or another insertion already is. Growth needs an empty "
-                                                       "region: move or shrink it.", filling.name, filling.region->text()));
+        throw io::UserError(filling.where,
+                            fmt::format("{} grows in {}, where a wall or another insertion already is. Growth needs an empty "
+                                        "region: move or shrink it.",
+                                        filling.name, filling.region->text()));
     for (std::size_t i = 0; i < at_[k].size(); ++i) occupancy_.add(at_[k][i], radii_[k][i]);
   }
 
   void place_on_lattice(std::size_t k) {
     const auto& filling = fillings_[k];
-    const auto sites = lattice_sites(*filling.region, filling.lattice, filling.largest_radius(), settings_.gravity,
-                                     [&](const Vec3& at, double radius) { return is_free(at, radius * touching); }, radii_[k].size());
+    const auto sites = lattice_sites(
+        *filling.region, filling.lattice, filling.largest_radius(), settings_.gravity,
+        [&](const Vec3& at, double radius) { return is_free(at, radius * touching); }, radii_[k].size());
     if (sites.size() < radii_[k].size())
-      throw io::UserError(filling.where, fmt::format("only {} of {} {}s of {} find a site of the lattice in {}. Enlarge the region, lower the "
-                                                     "count or the spacing, or choose another lattice.",
-                                                     sites.size(), radii_[k].size(), particle_word(settings_.dimension),
-                                                     diameters_text(radii_[k]), filling.region->text()));
+      throw io::UserError(filling.where,
+                          fmt::format("only {} of {} {}s of {} find a site of the lattice in {}. Enlarge the region, lower the "
+                                      "count or the spacing, or choose another lattice.",
+                                      sites.size(), radii_[k].size(), particle_word(settings_.dimension), diameters_text(radii_[k]),
+                                      filling.region->text()));
     auto random = stream(filling, k, places, settings_);
     for (std::size_t i = 0; i < sites.size(); ++i) {
       at_[k][i] = sites[i];
@@ -186,8 +192,9 @@ std::vector<double> radii_of(const Filling& filling, std::size_t index, const Fi
     radii = filling.sizes->draw_volume(filling.mass ? *filling.mass / filling.density : *filling.solid_fraction * filling.region->volume(),
                                        random);
     if (radii.empty())
-      throw io::UserError(filling.where, fmt::format("{} asks for less than half of its smallest {}. Raise the amount or make them smaller.",
-                                                     filling.name, particle_word(settings.dimension)));
+      throw io::UserError(filling.where,
+                          fmt::format("{} asks for less than half of its smallest {}. Raise the amount or make them smaller.", filling.name,
+                                      particle_word(settings.dimension)));
     return radii;
   }
   const auto vacant = [&](const Vec3& at, double radius) { return !settings.vacant || settings.vacant(at, radius * touching); };

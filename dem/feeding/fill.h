@@ -50,7 +50,7 @@ struct FillSettings {
   int dimension = 3;
   Vec3 gravity = Vec3::Zero();  ///< only its direction counts: lattices grow from where it points to
   std::uint64_t seed = 1;       ///< of the fillings without a seed of their own; each filling has streams of its own
-  Vacancy vacant;               ///< clear of the walls? may be empty
+  Vacancy vacant = {};          ///< clear of the walls? may be empty
 };
 
 /// The radii that filling `index` of a case will have, without placing them (in a lattice without amount: the sites are counted).

@@ -13,7 +13,8 @@ struct Pair {
   std::uint32_t first, second;
 };
 
-// Soft particles with unit springs. Lengths are in metres, forces are overlaps; the mass grows as the number of neighbours, r^(D−1), so that a large particle among small ones is no stiffer than they are.
+// Soft particles with unit springs. Lengths are in metres, forces are overlaps; the mass grows as the number of neighbours, r^(D−1), so
+// that a large particle among small ones is no stiffer than they are.
 class Relaxation {
  public:
   Relaxation(const Region& region, std::span<const double> radii, Random& random)
@@ -128,13 +129,16 @@ class Relaxation {
     for (std::uint32_t i = 0; i < count; ++i) {
       const double radius = scale_ * radii_[i];
       const int level = occupancy.level_of(radius);
-      occupancy.for_each_near(at_[i], radius, skin, [&](const Occupancy::Entry& other) {
-        const double reach = radius + other.radius + skin;
-        // From the smaller of the two; between equals from the later.
-        if ((occupancy.level_of(other.radius) < level || other.index < i) && (at_[i] - other.at).squaredNorm() < reach * reach)
-          pairs_.push_back({i, other.index});
-        return true;
-      }, level);
+      occupancy.for_each_near(
+          at_[i], radius, skin,
+          [&](const Occupancy::Entry& other) {
+            const double reach = radius + other.radius + skin;
+            // From the smaller of the two; between equals from the later.
+            if ((occupancy.level_of(other.radius) < level || other.index < i) && (at_[i] - other.at).squaredNorm() < reach * reach)
+              pairs_.push_back({i, other.index});
+            return true;
+          },
+          level);
     }
   }
 
@@ -210,7 +214,12 @@ Packing grow_packing(const Region& region, std::span<const double> radii, Random
         relaxation.anneal(1, 1e-2, 1e-5, steps, random);
         packing.jammed = !fits(1, patience);
       }
-    for (double share = 0.995; packing.at.empty() && share > 0.01; share *= share > 0.93 ? 0.995 : 0.98) fits(scale_for(share), patience);
+    // What does fit, to less than 1 % of the target.
+    double fit = 0, tight = 1;
+    while (packing.jammed && tight - fit > (fit > 0 ? 0.008 : 1e-3)) {
+      const double share = (fit + tight) / 2;
+      (fits(scale_for(share), patience) ? fit : tight) = share;
+    }
   }
   packing.iterations = relaxation.iterations();
   return packing;

@@ -56,9 +56,10 @@ std::vector<NewParticle> InletFeed::due(double time, const Vacancy& vacant) {
 
 std::optional<std::string> InletFeed::warning() const {
   if (!choked()) return std::nullopt;
-  return fmt::format("{} is choked since {:.6g} s: {:.4g} kg wait for room in {}. They are not lost and come when there is room. Lower the "
-                     "rate, raise the velocity with which particles leave the region, or enlarge it.",
-                     inlet_.name, state_.choked_since, backlog(), inlet_.region.text());
+  return fmt::format(
+      "{} is choked since {:.6g} s: {:.4g} kg wait for room in {}. They are not lost and come when there is room. Lower the "
+      "rate, raise the velocity with which particles leave the region, or enlarge it.",
+      inlet_.name, state_.choked_since, backlog(), inlet_.region.text());
 }
 
 }  // namespace acopla::dem

@@ -16,13 +16,13 @@ namespace acopla::dem {
 struct Inlet {
   std::string name;  ///< of the table, for messages
   std::uint8_t material = 0;
-  double density = 0;                                          ///< [kg/m³]
-  double rate = 0;                                             ///< [kg/s]; 2D: per metre of depth
-  double from = 0;                                             ///< [s]
-  double until = std::numeric_limits<double>::infinity();      ///< [s]
+  double density = 0;                                      ///< [kg/m³]
+  double rate = 0;                                         ///< [kg/s]; 2D: per metre of depth
+  double from = 0;                                         ///< [s]
+  double until = std::numeric_limits<double>::infinity();  ///< [s]
   SizeDistribution sizes;
-  Region region;                                               ///< whole particles inside; it must hold the largest
-  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();           ///< of every particle [m/s], [rad/s]
+  Region region;                                      ///< whole particles inside; it must hold the largest
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< of every particle [m/s], [rad/s]
   std::uint64_t seed = 1;
   io::Location where;
 };

@@ -16,10 +16,14 @@ struct Pattern {
 
 Pattern pattern_of(LatticeKind kind) {
   switch (kind) {
-    case LatticeKind::hexagonal: return {1, 0, std::sqrt(3) / 2, {0.5, 0}};
-    case LatticeKind::fcc: return {1, 0, std::sqrt(0.5), {0.5, 0.5}};  // square layers
-    case LatticeKind::hcp: return {std::sqrt(3) / 2, 0.5, std::sqrt(2.0 / 3.0), {0.5, std::sqrt(3) / 6}};
-    default: return {};
+    case LatticeKind::hexagonal:
+      return {1, 0, std::sqrt(3) / 2, {0.5, 0}};
+    case LatticeKind::fcc:
+      return {1, 0, std::sqrt(0.5), {0.5, 0.5}};  // square layers
+    case LatticeKind::hcp:
+      return {std::sqrt(3) / 2, 0.5, std::sqrt(2.0 / 3.0), {0.5, std::sqrt(3) / 6}};
+    default:
+      return {};
   }
 }
 
@@ -59,8 +63,9 @@ std::vector<Vec3> lattice_sites(const Region& region, const Lattice& lattice, do
         const bool odd_layer = layer % 2, odd_row = row % 2 != 0;
         Vec3 site = Vec3::Zero();
         site[up] = from_high ? bounds.high[up] - height : bounds.low[up] + height;
-        site[along] = first(along) + (static_cast<double>(column) + (odd_row ? pattern.shift_of_rows : 0) +
-                                      (odd_layer ? pattern.shift_of_layers[0] : 0)) * spacing;
+        site[along] =
+            first(along) +
+            (static_cast<double>(column) + (odd_row ? pattern.shift_of_rows : 0) + (odd_layer ? pattern.shift_of_layers[0] : 0)) * spacing;
         if (!flat)
           site[across] = first(across) + (static_cast<double>(row) * pattern.row + (odd_layer ? pattern.shift_of_layers[1] : 0)) * spacing;
         // A lattice that fits exactly must not lose its last row to round-off.

@@ -77,11 +77,14 @@ SizeDistribution read_sieve(const io::Table& table, int dimension) {
   const auto largest = table.optional_number("largest", io::positive), smallest = table.optional_number("smallest", io::positive);
   if (masses.front() > 0 && !largest)
     table.fail(kind, fmt::format("leaves mass on the coarsest sieve, {:.6g} m, without an upper size. Add largest, e.g. the opening of the "
-                                 "next coarser sieve.", openings.front()));
+                                 "next coarser sieve.",
+                                 openings.front()));
   if (masses.back() > 0 && !smallest)
     table.fail(kind, fmt::format("lets mass through the finest sieve, {:.6g} m, without a lower size. Add smallest.", openings.back()));
-  if (largest && *largest <= openings.front()) table.fail("largest", fmt::format("= {:.6g} must be above the coarsest opening, {:.6g} m.", *largest, openings.front()));
-  if (smallest && *smallest >= openings.back()) table.fail("smallest", fmt::format("= {:.6g} must be below the finest opening, {:.6g} m.", *smallest, openings.back()));
+  if (largest && *largest <= openings.front())
+    table.fail("largest", fmt::format("= {:.6g} must be above the coarsest opening, {:.6g} m.", *largest, openings.front()));
+  if (smallest && *smallest >= openings.back())
+    table.fail("smallest", fmt::format("= {:.6g} must be below the finest opening, {:.6g} m.", *smallest, openings.back()));
   std::vector<SieveClass> classes;
   for (std::size_t k = 0; k <= sieves; ++k)
     if (masses[k] > 0) classes.push_back({k < sieves ? openings[k] : *smallest, k > 0 ? openings[k - 1] : *largest, masses[k]});
@@ -92,18 +95,21 @@ SizeDistribution read_normal(const io::Table& sizes, int dimension) {
   const auto table = sizes.table("normal");
   const double mean = table.number("mean", io::positive), deviation = table.number("deviation", io::positive);
   if (!table.has("limits") && mean <= 3 * deviation)
-    table.fail("deviation", fmt::format("= {:.6g} reaches to zero: the limits are mean ± 3 deviations unless given. Add limits = [smallest, "
-                                        "largest] with smallest above 0, or use lognormal.", deviation));
+    table.fail("deviation",
+               fmt::format("= {:.6g} reaches to zero: the limits are mean ± 3 deviations unless given. Add limits = [smallest, "
+                           "largest] with smallest above 0, or use lognormal.",
+                           deviation));
   const auto [low, high] = table.has("limits") ? limits_of(table, "limits") : std::pair(mean - 3 * deviation, mean + 3 * deviation);
   return SizeDistribution::normal(mean, deviation, low, high, by(sizes), dimension);
 }
 
 SizeDistribution read_lognormal(const io::Table& sizes, int dimension) {
-  constexpr io::Range deviations{0, 3, true, false, "It is the deviation of ln d, about the relative width; 3 is a ratio of 20 either way."};
+  constexpr io::Range deviations{0, 3, true, false,
+                                 "It is the deviation of ln d, about the relative width; 3 is a ratio of 20 either way."};
   const auto table = sizes.table("lognormal");
   const double median = table.number("median", io::positive), deviation = table.number("deviation", deviations);
-  const auto [low, high] = table.has("limits") ? limits_of(table, "limits")
-                                               : std::pair(median * std::exp(-3 * deviation), median * std::exp(3 * deviation));
+  const auto [low, high] =
+      table.has("limits") ? limits_of(table, "limits") : std::pair(median * std::exp(-3 * deviation), median * std::exp(3 * deviation));
   return SizeDistribution::lognormal(median, deviation, low, high, by(sizes), dimension);
 }
 
@@ -125,7 +131,8 @@ Vec3 read_velocity(const io::Table& table, int dimension) {
 
 void check_holds(const io::Table& table, const Region& region, double radius) {
   if (!region.holds(radius))
-    table.fail("region", fmt::format("is thinner than one diameter of {:.4g} m: no whole {} fits.", 2 * radius, particle_word(region.dimension())));
+    table.fail("region",
+               fmt::format("is thinner than one diameter of {:.4g} m: no whole {} fits.", 2 * radius, particle_word(region.dimension())));
 }
 
 std::vector<NewParticle> read_particles(const io::Table& table, std::uint8_t material, int dimension) {
@@ -146,8 +153,8 @@ Lattice read_lattice(const io::Table& insert, const Filling& filling, int dimens
   if (insert.has("lattice")) {
     const auto table = insert.table("lattice");
     if (table.has("kind")) {
-      const std::vector<std::string> names = dimension == 2 ? std::vector<std::string>{"square", "hexagonal"}
-                                                            : std::vector<std::string>{"cubic", "fcc", "hcp"};
+      const std::vector<std::string> names =
+          dimension == 2 ? std::vector<std::string>{"square", "hexagonal"} : std::vector<std::string>{"cubic", "fcc", "hcp"};
       const std::vector<LatticeKind> kinds = dimension == 2 ? std::vector{LatticeKind::square, LatticeKind::hexagonal}
                                                             : std::vector{LatticeKind::cubic, LatticeKind::fcc, LatticeKind::hcp};
       const auto name = table.choice("kind", names);
@@ -155,11 +162,13 @@ Lattice read_lattice(const io::Table& insert, const Filling& filling, int dimens
     }
     lattice.spacing = table.number("spacing", io::positive, 0);
     if (lattice.spacing > 0 && lattice.spacing < diameter * (1 - 1e-12))
-      table.fail("spacing", fmt::format("= {:.6g} is below the largest diameter, {:.6g} m: neighbours would overlap.", lattice.spacing, diameter));
+      table.fail("spacing",
+                 fmt::format("= {:.6g} is below the largest diameter, {:.6g} m: neighbours would overlap.", lattice.spacing, diameter));
     lattice.jitter = table.number("jitter", io::fraction, 0);
     if (lattice.jitter > 0 && lattice.spacing == 0)
-      table.fail("jitter", fmt::format("has no room while the particles touch. Add a spacing above the largest diameter, e.g. spacing = {:.4g}.",
-                                       1.1 * diameter));
+      table.fail("jitter",
+                 fmt::format("has no room while the particles touch. Add a spacing above the largest diameter, e.g. spacing = {:.4g}.",
+                             1.1 * diameter));
   }
   if (lattice.spacing == 0) lattice.spacing = diameter;
   return lattice;
@@ -208,12 +217,14 @@ Region read_region(const io::Table& table, int dimension) {
   const auto region = table.table("region");
   for (const auto* other : {"sphere", "cylinder", "disc"})
     if (region.has(other) && (std::string_view(other) == "disc") != (dimension == 2))
-      region.fail(other, fmt::format("is no region in {} dimensions. Use {}.", dimension, dimension == 2 ? "box or disc" : "box, sphere or cylinder"));
-  const auto shape = only_key(region, dimension == 2 ? std::vector<std::string>{"box", "disc"}
-                                                     : std::vector<std::string>{"box", "sphere", "cylinder"});
+      region.fail(other, fmt::format("is no region in {} dimensions. Use {}.", dimension,
+                                     dimension == 2 ? "box or disc" : "box, sphere or cylinder"));
+  const auto shape =
+      only_key(region, dimension == 2 ? std::vector<std::string>{"box", "disc"} : std::vector<std::string>{"box", "sphere", "cylinder"});
   if (shape == "box") {
     const auto corners = region.vectors("box", dimension);
-    if (corners.size() != 2) region.fail("box", dimension == 2 ? "must be two corners, [[x, y], [x, y]]." : "must be two corners, [[x, y, z], [x, y, z]].");
+    if (corners.size() != 2)
+      region.fail("box", dimension == 2 ? "must be two corners, [[x, y], [x, y]]." : "must be two corners, [[x, y, z], [x, y, z]].");
     return Region::box(corners[0], corners[1], dimension);
   }
   const auto values = region.table(shape);
@@ -240,8 +251,10 @@ Filling read_filling(const io::Table& table, const FeedingScope& scope) {
   filling.sizes = read_sizes(table, scope.dimension);
   filling.region = read_region(table, scope.dimension);
   read_amount(table, filling);
-  if (filling.placing == Placing::lattice) filling.lattice = read_lattice(table, filling, scope.dimension);
-  else if (table.has("lattice")) table.fail("lattice", fmt::format("has no effect with place = \"{}\". Add place = \"lattice\" or remove it.", place));
+  if (filling.placing == Placing::lattice)
+    filling.lattice = read_lattice(table, filling, scope.dimension);
+  else if (table.has("lattice"))
+    table.fail("lattice", fmt::format("has no effect with place = \"{}\". Add place = \"lattice\" or remove it.", place));
   if (!(filling.count && filling.solid_fraction)) check_holds(table, *filling.region, filling.largest_radius());
   filling.velocity = read_velocity(table, scope.dimension);
   filling.spin = read_spin(table, scope.dimension);
@@ -258,8 +271,18 @@ Inlet read_inlet(const io::Table& table, const FeedingScope& scope, std::size_t 
   const double from = table.number("from", io::non_negative, 0);
   const double until = table.number("until", io::positive, std::numeric_limits<double>::infinity());
   if (until <= from) table.fail("until", fmt::format("= {:.6g} is not after from = {:.6g}.", until, from));
-  Inlet inlet{table.name(), material, density, rate, from, until, read_sizes(table, scope.dimension), read_region(table, scope.dimension),
-              read_velocity(table, scope.dimension), read_spin(table, scope.dimension), 0, table.location("rate")};
+  Inlet inlet{table.name(),
+              material,
+              density,
+              rate,
+              from,
+              until,
+              read_sizes(table, scope.dimension),
+              read_region(table, scope.dimension),
+              read_velocity(table, scope.dimension),
+              read_spin(table, scope.dimension),
+              0,
+              table.location("rate")};
   check_holds(table, inlet.region, inlet.sizes.largest_radius());
   const auto stream = Random::stream(scope.seed, 0x696e6c6574 + index).state();  // far from the fillings' streams
   inlet.seed = table.has("seed") ? static_cast<std::uint64_t>(table.integer("seed", 0, std::numeric_limits<std::int64_t>::max())) : stream;

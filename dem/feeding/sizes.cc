@@ -87,8 +87,8 @@ SizeDistribution SizeDistribution::sieved(const std::vector<SieveClass>& sieves,
   std::vector<Class> classes;
   for (const auto& sieve : sieves)
     if (sieve.mass > 0)
-      classes.push_back({DiameterLaw(sieve.low, sieve.high, dimension, [&](double d) { return std::pow(d / sieve.low, -1 - dimension); }),
-                         sieve.mass});
+      classes.push_back(
+          {DiameterLaw(sieve.low, sieve.high, dimension, [&](double d) { return std::pow(d / sieve.low, -1 - dimension); }), sieve.mass});
   return SizeDistribution(std::move(classes), dimension);
 }
 
