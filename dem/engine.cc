@@ -39,6 +39,7 @@ Engine::Engine(const Scene& scene, Particles particles, WallSet walls)
     : gravity_(scene.gravity), damping_(scene.damping), kernels_(make_kernels(scene)), particles_(std::move(particles)), walls_(std::move(walls)),
       keeps_ledger_(scene.keeps_ledger), allow_unstable_(scene.allow_unstable_step), drift_limit_(scene.drift_limit),
       partitions_(std::max(1u, scene.partitions)), team_(std::max(1u, scene.threads)) {
+  for (const auto& material : scene.materials) densities_.push_back(material.density);
   set_sizes();
   set_domain(scene);
   loads_ = WallLoadSum(walls_, partitions_.size());
@@ -279,7 +280,7 @@ void Engine::sort_particles(const std::vector<std::uint32_t>& order) {
 void Engine::insert(const std::vector<NewParticle>& particles) {
   if (particles.empty()) return;
   const double before = keeps_ledger_ ? kinetic_energy() + potential_energy() : 0;
-  for (const auto& p : particles) particles_.add(p.at, p.radius, p.density, p.material, p.velocity, p.spin);
+  for (const auto& p : particles) particles_.add(p.at, p.radius, densities_[p.material], p.material, p.velocity, p.spin);
   if (keeps_ledger_) ledger_.add(kinetic_energy() + potential_energy() - before);
   set_sizes();
   outdated_ = true;

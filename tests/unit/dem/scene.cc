@@ -1,7 +1,7 @@
 // What a user may write wrong in a DEM table, and the sentence that answers.
 #include <gtest/gtest.h>
 
-#include "dem/insertion.h"
+#include "dem/feeding/insertion.h"
 #include "scenes.h"
 
 namespace acopla::dem::test {
@@ -84,8 +84,8 @@ TEST(SceneErrors, EachIsLocatedAndSaysHowToMendIt) {
 
 TEST(Insertion, SpheresAreInsideTheRegionAndDoNotOverlap) {
   auto scene = read_scene(io::Table::from_text(good, "case.toml"), "g");
-  scene.insertions[0].count = 500;
-  scene.insertions[0].radius = 0.03;
+  scene.fillings[0].count = 500;
+  scene.fillings[0].sizes = SizeDistribution::one(0.06, 3);
   const auto particles = insert_particles(scene, WallSet(scene.walls));
   ASSERT_EQ(particles.size(), 500u);
   for (std::size_t i = 0; i < particles.size(); ++i) {
