@@ -141,7 +141,7 @@ class Drop {
     SavedWallHistories saved;
     contacts.collect(particles, saved);
     saved.sort();
-    walls.mark(Vec3::Constant(-1), Vec3::Constant(1));
+    walls.mark(Vec3::Constant(-1), Vec3::Constant(1), radius);
     contacts.find(kernels_, walls, particles, 0, static_cast<std::uint32_t>(particles.size()), skin_);
     contacts.restore(walls, particles, saved);
     reference_ = particles.position;
@@ -156,7 +156,7 @@ class Drop {
     particles.reorder(order);
     std::reverse(acceleration_.begin(), acceleration_.end());
     std::reverse(turning_.begin(), turning_.end());
-    walls.mark(Vec3::Constant(-1), Vec3::Constant(1));
+    walls.mark(Vec3::Constant(-1), Vec3::Constant(1), radius);
     contacts.find(kernels_, walls, particles, 0, static_cast<std::uint32_t>(particles.size()), skin_);
     contacts.restore(walls, particles, saved);
     reference_ = particles.position;
