@@ -217,7 +217,18 @@ class Drop {
     if (particles.kind.dimension == 2) return {0, 0, particles.force[i].z};
     return particles.kind.rotates ? particles.torque[i].vector() : Vec3(Vec3::Zero());
   }
-  double skin() const { return skin_; }
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("particles", particles);
+    archive("walls", walls);
+    archive("contacts", contacts);
+    archive("sum", sum);
+    archive("time", time);
+    archive("rebuilds", rebuilds);
+    archive("acceleration", acceleration_);
+    archive("turning", turning_);
+    archive("reference", reference_);
+  }
   const KernelTable& kernels() const { return kernels_; }
 
  private:
