@@ -317,6 +317,27 @@ TEST(Regions, ContainWhatTheirVolumeSays) {
   }
 }
 
+// All of many points are within the bounds, and some come near each side: the region's part within 0.05 of a side is at least 3e-4 of
+// it (a cap of the cylinder's rim), so that none of 10⁵ points falls there once in e^30.
+TEST(Regions, BoundsAreTight) {
+  Random random(8);
+  for (const auto& region : all_regions()) {
+    const auto bounds = region.bounds();
+    Vec3 low = Vec3::Constant(1e9), high = -low;
+    for (int k = 0; k < 100000; ++k) {
+      const Vec3 at = region.random_point(random);
+      low = low.cwiseMin(at);
+      high = high.cwiseMax(at);
+    }
+    for (int d = 0; d < region.dimension(); ++d) {
+      EXPECT_GE(low[d], bounds.low[d] - 1e-12) << region.text();
+      EXPECT_LE(high[d], bounds.high[d] + 1e-12) << region.text();
+      EXPECT_LT(low[d], bounds.low[d] + 0.05) << region.text();
+      EXPECT_GT(high[d], bounds.high[d] - 0.05) << region.text();
+    }
+  }
+}
+
 // Centres of whole particles, uniform over the region shrunk by the radius: mean and mean square distance from the centre against
 // the integrals over the shape; four standard errors, bounded by those of the square's largest value.
 TEST(Regions, RandomPointsAreUniformAndInside) {
