@@ -16,7 +16,7 @@ namespace acopla::dem {
 template <class Real>
 struct ContactEnergy {
   Real normal = Real(0), tangential = Real(0), rolling = Real(0);  ///< stored in the springs now [J]
-  Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant [W]
+  Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant, by dashpot or plastic flow [W]
   Real tangential_power = Real(0);    ///< taken from the bodies by tangential forces [W]
   Real rolling_power = Real(0);       ///< taken from the bodies by rolling torques [W]
 
@@ -51,6 +51,7 @@ struct ContactModel {
   /// What a contact carries from step to step. Where the laws store nothing, nothing is stored.
   template <class K>
   struct History {
+    [[no_unique_address]] typename Normal::template History<K> normal;
     [[no_unique_address]] typename Tangential::template History<K> tangential;
     [[no_unique_address]] typename Rolling::template History<K> rolling;
   };
@@ -58,6 +59,7 @@ struct ContactModel {
   static constexpr std::size_t history_size() {
     std::size_t size = 0;
     const auto count = [&](Stored stored) { size += stored == Stored::scalar ? 1 : static_cast<std::size_t>(K::turns); };
+    for (const auto stored : Normal::template stored<K::dimension>) count(stored);
     for (const auto stored : Tangential::template stored<K::dimension>) count(stored);
     for (const auto stored : Rolling::template stored<K::dimension>) count(stored);
     return size;
@@ -71,6 +73,7 @@ struct ContactModel {
       const bool flips = stored == Stored::torque || (stored == Stored::force && K::dimension == 3);
       for (int n = 0; n < (stored == Stored::scalar ? 1 : K::turns); ++n) signs[at++] = flips ? -1.0 : 1.0;
     };
+    for (const auto stored : Normal::template stored<K::dimension>) add(stored);
     for (const auto stored : Tangential::template stored<K::dimension>) add(stored);
     for (const auto stored : Rolling::template stored<K::dimension>) add(stored);
     return signs;
@@ -89,10 +92,11 @@ struct ContactModel {
     using Real = typename K::Real;
     const auto touches = k.overlap > Real(0);
     Response<K> response;
-    response.normal = select(touches, Normal::force(k, p.normal), Real(0));
+    response.normal = select(touches, Normal::force(k, p.normal, history.normal), Real(0));
     if (energy) {
-      energy->normal = Normal::energy(k, p.normal);
-      energy->normal_dashpot = select(touches, (response.normal - Normal::elastic_force(k, p.normal)) * k.closing_speed, Real(0));
+      energy->normal = Normal::energy(k, p.normal, history.normal);
+      const Real elastic = Normal::elastic_force(k, p.normal, history.normal);
+      energy->normal_dashpot = select(touches, (response.normal - elastic) * k.closing_speed, Real(0));
     }
     Real shear_stiffness(0);
     if constexpr (has_friction) {

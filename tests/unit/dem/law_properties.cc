@@ -1,0 +1,383 @@
+// What every contact law must do, whatever it is: the properties of each combination of laws, for discs and spheres.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/dem/all_models.h"
+#include "tests/unit/dem/law_paths.h"
+
+namespace acopla::dem::test {
+namespace {
+
+template <class Case_>
+class LawProperties : public ::testing::Test {
+ public:
+  using Model = typename Case_::Model;
+  static constexpr int dimension = Case_::dimension;
+  using K = Kinematics<double, dimension>;
+  using History = typename Model::template History<K>;
+  using Response = typename Model::template Response<K>;
+  using Path = ClosedPath<dimension>;
+  static constexpr std::size_t numbers = Model::template history_size<K>();
+
+  static Response respond(const K& k, const typename Model::Parameters& p, History& history, ContactEnergy<double>* energy = nullptr) {
+    auto r = Model::respond(k, p, history, energy);
+    if (!Model::has_friction) r.shear = zero_vector<double, K::turns>();
+    if (!Model::has_rolling) r.torque = zero_vector<double, K::turns>();
+    return r;
+  }
+  static std::array<double, numbers> flat(const History& history) {
+    std::array<double, numbers> values{};
+    if constexpr (numbers > 0) {
+      static_assert(sizeof(History) == sizeof(values));
+      std::copy_n(reinterpret_cast<const double*>(&history), numbers, values.begin());
+    }
+    return values;
+  }
+  static void set(History& history, const std::array<double, numbers>& values) {
+    if constexpr (numbers > 0) std::copy_n(values.begin(), numbers, reinterpret_cast<double*>(&history));
+  }
+
+  // The contact of j with i.
+  static K swapped(K k) {
+    k.normal = -k.normal;
+    if (dimension == 3) k.slip = -k.slip;  // in the plane it is a number along the tangent, which turns round too
+    k.relative_spin = -k.relative_spin;
+    return k;
+  }
+};
+TYPED_TEST_SUITE(LawProperties, AllModels, CaseName);
+
+TEST(PropertyTests, CoverEveryBuiltInLaw) {
+  std::vector<LawSet> covered;
+  [&]<class... Cases>(::testing::Types<Cases...>*) { (covered.push_back(names_of<typename Cases::Model>()), ...); }(static_cast<AllModels*>(nullptr));
+  for (const auto& laws : Laws::built_in().combinations()) EXPECT_TRUE(std::find(covered.begin(), covered.end(), laws) != covered.end()) << laws.text();
+}
+
+TYPED_TEST(LawProperties, AreTheSameWhicheverBodyIsCalledTheFirst) {
+  // Only signs change, which rounding does not see.
+  using T = LawProperties<TypeParam>;
+  const auto p = T::Model::from(soft_glass());
+  const auto signs = T::Model::template swap_signs<typename T::K>();
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const typename T::Path path(seed);
+    typename T::History a{}, b{};
+    const double step = T::Path::period / 200;
+    for (int n = 0; n < 200; ++n) {
+      auto k = path.at(n * step, step);
+      k.mean_spin = vector_of<T::K::turns>(Vec3(30, -20, 10));
+      auto renamed = T::flat(a);
+      for (std::size_t m = 0; m < T::numbers; ++m) renamed[m] *= signs[m];
+      T::set(b, renamed);
+      const auto on_i = T::respond(k, p, a), on_j = T::respond(T::swapped(k), p, b);
+      ASSERT_EQ(on_i.normal, on_j.normal);
+      ASSERT_EQ((eigen(on_i.shear) + (T::dimension == 3 ? 1 : -1) * eigen(on_j.shear)).norm(), 0);
+      ASSERT_EQ((eigen(on_i.torque) + eigen(on_j.torque)).norm(), 0);
+      auto kept = T::flat(b);
+      for (std::size_t m = 0; m < T::numbers; ++m) ASSERT_EQ(kept[m] * signs[m], T::flat(a)[m]);
+    }
+  }
+}
+
+TYPED_TEST(LawProperties, DoNotDependOnTheObserversDirections) {
+  // The whole motion in a turned frame; round-off of the rotation, which friction and yield carry along without growth.
+  using T = LawProperties<TypeParam>;
+  const auto p = T::Model::from(soft_glass());
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const typename T::Path path(seed);
+    const Eigen::AngleAxisd turn(0.3 + seed, T::dimension == 3 ? Vec3(1, 2, seed).normalized() : Vec3::UnitZ());
+    const auto turned = [&](const auto& v) { return vector_of<3>(turn * eigen(v)); };
+    typename T::History here{}, there{};
+    const double step = T::Path::period / 200;
+    double force = 0, torque = 0;
+    for (int n = 0; n < 200; ++n) {
+      auto k = path.at(n * step, step);
+      k.mean_spin = vector_of<T::K::turns>(Vec3(30, -20, 10));
+      auto k_turned = k;
+      k_turned.normal = vector_of<T::dimension>(turn * eigen(k.normal));
+      if constexpr (T::dimension == 3) {
+        k_turned.slip = turned(k.slip);
+        k_turned.mean_spin = turned(k.mean_spin);
+        k_turned.relative_spin = turned(k.relative_spin);
+      }
+      const auto r = T::respond(k, p, here), s = T::respond(k_turned, p, there);
+      force = std::max(force, r.normal);
+      torque = std::max(torque, eigen(r.torque).norm());
+      ASSERT_NEAR(r.normal, s.normal, 1e-14 * force);
+      if constexpr (T::dimension == 3) {
+        ASSERT_LE((turn * eigen(r.shear) - eigen(s.shear)).norm(), 1e-13 * force);
+        ASSERT_LE((turn * eigen(r.torque) - eigen(s.torque)).norm(), 1e-13 * torque);
+      } else {
+        ASSERT_EQ(r.shear.x, s.shear.x);
+        ASSERT_EQ(r.torque.x, s.torque.x);
+      }
+    }
+  }
+}
+
+// The ledger of one contact: work taken from the bodies by the trapezoidal rule, less what the springs store.
+struct Loss {
+  double taken = 0, stored = 0, largest = 0, last_power = 0;
+  bool started = false;
+  double total = 0, rise = 0;   // lost so far; how far it ever stood below an earlier value
+  double peak = 0;
+  template <class K, class Response>
+  void add(const K& k, const Response& r, const ContactEnergy<double>& energy) {
+    const double power = r.normal * k.closing_speed - dot(r.shear, k.slip) - dot(r.torque, k.relative_spin);
+    const double now = energy.normal + energy.tangential + energy.rolling;
+    largest = std::max(largest, now);
+    if (started) {
+      total += 0.5 * k.step * (last_power + power) - (now - stored);
+      peak = std::max(peak, total);
+      rise = std::max(rise, peak - total);
+    }
+    last_power = power;
+    stored = now;
+    started = true;
+  }
+};
+
+TYPED_TEST(LawProperties, NeverGiveEnergy) {
+  // On random closed paths of overlap, slip and relative rotation, twice round, what the contact has taken from the bodies beyond
+  // what its springs hold only grows. The trapezoidal rule leaves an error of order (2π/N)² of the energy that is exchanged; the
+  // third harmonic of the paths makes it nine times as large.
+  using T = LawProperties<TypeParam>;
+  for (const auto& pair : {soft_glass(), elastic_glass()}) {
+    const auto p = T::Model::from(pair);
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      const typename T::Path path(seed);
+      constexpr int steps = 4000;
+      const double step = T::Path::period / steps;
+      typename T::History history{};
+      Loss loss;
+      for (int n = 0; n <= 2 * steps; ++n) {
+        ContactEnergy<double> energy;
+        const auto k = path.at(n * step, step);
+        const auto r = T::respond(k, p, history, &energy);
+        loss.add(k, r, energy);
+      }
+      EXPECT_LE(loss.rise, 9 * std::pow(2 * M_PI / steps, 2) * loss.largest) << seed << " of " << loss.largest;
+    }
+  }
+}
+
+TYPED_TEST(LawProperties, TheLedgersPowersAreTheWorkOfTheForces) {
+  // What the ledger is told of one step must be what forces and motion say: the normal direction's loss is its power less the change
+  // of its stored energy, the others are powers themselves. Differences by the trapezoidal rule: of second order in the step, where
+  // nothing jumps; a jump (contact that stops pulling, a yield that begins) leaves one step's share.
+  using T = LawProperties<TypeParam>;
+  const auto p = T::Model::from(soft_glass());
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const typename T::Path path(seed);
+    double errors[2];
+    for (const int refined : {0, 1}) {
+      const int steps = refined ? 16000 : 4000;
+      const double step = T::Path::period / steps;
+      typename T::History history{};
+      double taken = 0, lost = 0, stored = 0, first = 0, scale = 0;
+      ContactEnergy<double> last;
+      double last_power = 0;
+      for (int n = 0; n <= steps; ++n) {
+        ContactEnergy<double> energy;
+        const auto k = path.at(n * step, step);
+        const auto r = T::respond(k, p, history, &energy);
+        const double power = r.normal * k.closing_speed;
+        if (T::Model::has_friction) { ASSERT_EQ(energy.tangential_power, -dot(r.shear, k.slip)); }
+        if (T::Model::has_rolling) { ASSERT_EQ(energy.rolling_power, -dot(r.torque, k.relative_spin)); }
+        if (n > 0) {
+          taken += 0.5 * step * (power + last_power);
+          lost += 0.5 * step * (energy.normal_dashpot + last.normal_dashpot);
+        } else {
+          first = energy.normal;
+        }
+        stored = energy.normal;
+        scale = std::max(scale, stored);
+        last = energy;
+        last_power = power;
+      }
+      errors[refined] = std::abs(taken - lost - (stored - first)) / scale;
+    }
+    EXPECT_LE(errors[0], 20 * 2 * M_PI / 4000) << seed;
+    EXPECT_LE(errors[1], 20 * 2 * M_PI / 16000) << seed;
+  }
+}
+
+TYPED_TEST(LawProperties, ReturnWhatTheSpringsStored) {
+  // Without dashpots and within all limits the way back gives what the way there took. Tangential and rolling springs at constant
+  // overlap, the normal one without slip, so that Mindlin's loss on unloading stays out. Error of the trapezoidal rule, see above.
+  using T = LawProperties<TypeParam>;
+  auto pair = elastic_glass();
+  if (std::is_same_v<typename T::Model::Rolling, ConstantTorque>) pair.rolling_friction = 0;  // it has no spring
+  const auto p = T::Model::from(pair);
+  for (const bool along : {true, false})
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      typename T::Path path(seed);
+      (along ? path.sliding : path.breathing) = 0;
+      if (along) path.rolling = 0;
+      constexpr int steps = 4000;
+      const double step = T::Path::period / steps;
+      typename T::History history{};
+      Loss loss;
+      for (int n = 0; n <= steps; ++n) {
+        ContactEnergy<double> energy;
+        const auto k = path.at(n * step, step);
+        const auto r = T::respond(k, p, history, &energy);
+        loss.add(k, r, energy);
+      }
+      EXPECT_NEAR(loss.total, 0, 9 * std::pow(2 * M_PI / steps, 2) * loss.largest);
+      if (along || T::Model::has_friction) { EXPECT_GT(loss.largest, 1e-9); }  // ½ 1e3 N/m (1e-6 m)²
+    }
+}
+
+TYPED_TEST(LawProperties, SpringsAreOfSecondOrderInTheStep) {
+  // Force and torque at a third of a closed path, with loading and unloading, sticking; the path is entered without slip and spin.
+  // Halving the step divides the error by 4; 32 times finer steps stand for the exact answer, which moves the ratio by 1/1024.
+  using T = LawProperties<TypeParam>;
+  if constexpr (T::Model::has_friction) {
+    const auto p = T::Model::from(elastic_glass());
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      const typename T::Path path(seed);
+      const auto after = [&](int steps) {
+        const double step = T::Path::period / 3 / steps;
+        typename T::History history{};
+        typename T::Response r{};
+        for (int n = 1; n <= steps; ++n) {
+          auto k = path.at(n * step, step);
+          const double entry = std::min(1.0, n * step / (T::Path::period / 12)), share = entry * entry * (3 - 2 * entry);
+          k.slip = share * k.slip;
+          k.relative_spin = share * k.relative_spin;
+          k.mean_spin = vector_of<T::K::turns>(30 * eigen(k.normal));  // the frame turns about the normal
+          r = T::respond(k, p, history);
+        }
+        return r;
+      };
+      const auto exact = after(128 * 60), coarse = after(4 * 60), fine = after(8 * 60);
+      const auto ratio = [&](auto what) { return (eigen(what(coarse)) - eigen(what(exact))).norm() / (eigen(what(fine)) - eigen(what(exact))).norm(); };
+      EXPECT_NEAR(ratio([](const auto& r) { return r.shear; }), 4, 0.1) << seed;
+      if (std::is_same_v<typename T::Model::Rolling, ElasticPlastic>) {
+        EXPECT_NEAR(ratio([](const auto& r) { return r.torque; }), 4, 0.1) << seed;
+      }
+    }
+  }
+}
+
+TYPED_TEST(LawProperties, AFrameThatTurnsCarriesTheSpringsAlong) {
+  // The same motion, seen from a frame that turns by two radians about an oblique axis: response and history turn with it. Springs are
+  // carried by first-order rotations whose direction is off by a quarter of the square of the tilt in each step (the length is not):
+  // over N steps by 2²/(4 N) of the springs at most, and half of that with half the step.
+  using T = LawProperties<TypeParam>;
+  if constexpr (T::dimension == 3) {
+    const auto p = T::Model::from(soft_glass());
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      const typename T::Path path(seed);
+      const Vec3 axis = Vec3(1, -2, seed).normalized();
+      const double angle = 2;
+      const auto worst = [&](int steps) {
+        const double step = T::Path::period / steps;
+        typename T::History still{}, turning{};
+        double force = 0, torque = 0, shear_error = 0, torque_error = 0;
+        for (int n = 1; n <= steps; ++n) {
+          const auto k = path.at(n * step, step);
+          const Eigen::AngleAxisd turn(angle * n / steps, axis);
+          auto seen = k;
+          seen.normal = vector_of<3>(turn * eigen(k.normal));
+          seen.slip = vector_of<3>(turn * eigen(k.slip));
+          seen.relative_spin = vector_of<3>(turn * eigen(k.relative_spin));
+          seen.mean_spin = vector_of<3>(axis * angle / T::Path::period);
+          const auto r = T::respond(k, p, still), s = T::respond(seen, p, turning);
+          EXPECT_NEAR(r.normal, s.normal, 1e-14 * r.normal);
+          force = std::max(force, eigen(r.shear).norm());
+          torque = std::max(torque, eigen(r.torque).norm());
+          shear_error = std::max(shear_error, (turn * eigen(r.shear) - eigen(s.shear)).norm());
+          torque_error = std::max(torque_error, (turn * eigen(r.torque) - eigen(s.torque)).norm());
+        }
+        return std::max(force > 0 ? shear_error / force : 0, torque > 0 ? torque_error / torque : 0);
+      };
+      EXPECT_LE(worst(4000), 1.0 / 4000) << seed;
+      EXPECT_LE(worst(8000), 1.0 / 8000) << seed;
+    }
+  }
+}
+
+TYPED_TEST(LawProperties, AreFiniteAndSilentWithoutOverlap) {
+  // Lanes that do not touch are computed too, with whatever motion the bodies have.
+  using T = LawProperties<TypeParam>;
+  const auto p = T::Model::from(soft_glass());
+  std::vector<typename T::K> contacts;
+  for (unsigned seed = 1; seed <= 5; ++seed) contacts.push_back(typename T::Path(seed).at(seed * 1e-3, 1e-5));
+  for (const int still : {1, 2, 3}) {  // nothing slips; nothing spins; neither
+    auto k = contacts.front();
+    if (still & 1) k.slip = zero_vector<double, T::K::turns>();
+    if (still & 2) k.relative_spin = zero_vector<double, T::K::turns>();
+    contacts.push_back(k);
+  }
+  for (auto k : contacts) {
+    k.overlap = 0;
+    std::array<double, T::numbers> forces{};
+    forces.fill(1e-3);
+    for (const bool was_touching : {false, true}) {
+      typename T::History history{};
+      if (was_touching) T::set(history, forces);
+      ContactEnergy<double> energy;
+      const auto r = T::respond(k, p, history, &energy);
+      EXPECT_EQ(r.normal, 0);
+      EXPECT_EQ(eigen(r.shear).norm(), 0);
+      EXPECT_EQ(eigen(r.torque).norm(), 0);
+      for (const double value : T::flat(history)) EXPECT_TRUE(std::isfinite(value));
+      for (const double value : {energy.normal, energy.tangential, energy.rolling, energy.normal_dashpot, energy.tangential_power, energy.rolling_power})
+        EXPECT_TRUE(std::isfinite(value));
+    }
+  }
+}
+
+TYPED_TEST(LawProperties, FourLanesAreFourContacts) {
+  // Four paths at once and one by one: one slides more than the others, one starts without overlap, one stands still. The operations
+  // are the same up to fused multiply-adds, and neither friction nor yield makes round-off grow.
+  using T = LawProperties<TypeParam>;
+  using Pack = Kinematics<Double4, T::dimension>;
+  const auto p = T::Model::from(soft_glass());
+  std::vector<typename T::Path> paths;
+  for (unsigned lane = 0; lane < 4; ++lane) paths.emplace_back(lane + 1);
+  paths[1].sliding *= 10;
+  paths[3].sliding = paths[3].rolling = paths[3].breathing = 0;
+  const double step = T::Path::period / 300;
+  typename T::History one[4] = {};
+  typename T::Model::template History<Pack> packed;
+  if constexpr (T::numbers > 0) std::fill_n(reinterpret_cast<double*>(&packed), 4 * T::numbers, 0.0);
+  double force = 0, torque = 0;
+  for (int n = 0; n < 300; ++n) {
+    Pack pack;
+    typename T::Response alone[4];
+    ContactEnergy<double> energies[4];
+    for (int lane = 0; lane < 4; ++lane) {
+      auto k = paths[static_cast<std::size_t>(lane)].at(n * step, step);
+      if (lane == 2 && n < 20) k.overlap = 0;
+      k.mean_spin = vector_of<T::K::turns>(Vec3(30, -20, 10 * lane));
+      // Every member of Kinematics but the step is a row of doubles.
+      constexpr std::size_t rows = sizeof(typename T::K) / sizeof(double) - 1;
+      static_assert(sizeof(Pack) >= (rows * 4 + 1) * sizeof(double));
+      for (std::size_t row = 0; row < rows; ++row) reinterpret_cast<double*>(&pack)[4 * row + static_cast<std::size_t>(lane)] = reinterpret_cast<const double*>(&k)[row];
+      alone[lane] = T::respond(k, p, one[lane], &energies[lane]);
+      force = std::max(force, alone[lane].normal);
+      torque = std::max(torque, eigen(alone[lane].torque).norm());
+    }
+    pack.step = step;
+    ContactEnergy<Double4> energy;
+    const auto together = T::Model::respond(pack, p, packed, &energy);
+    const auto lane_of = [](const auto& v, int lane) {
+      if constexpr (T::K::turns == 1) return Vec3(v.x[lane], 0, 0);
+      else return Vec3(v.x[lane], v.y[lane], v.z[lane]);
+    };
+    for (int lane = 0; lane < 4; ++lane) {
+      ASSERT_NEAR(together.normal[lane], alone[lane].normal, 1e-14 * force);
+      if constexpr (T::Model::has_friction) { ASSERT_LE((lane_of(together.shear, lane) - eigen(alone[lane].shear)).norm(), 1e-13 * force); }
+      if constexpr (T::Model::has_rolling) { ASSERT_LE((lane_of(together.torque, lane) - eigen(alone[lane].torque)).norm(), 1e-13 * torque); }
+      ASSERT_NEAR(energy.normal[lane], energies[lane].normal, 1e-13 * force * 1e-4);
+      ASSERT_NEAR(energy.tangential[lane], energies[lane].tangential, 1e-13 * force * 1e-4);
+      ASSERT_NEAR(energy.rolling[lane], energies[lane].rolling, 1e-13 * force * 1e-4);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace acopla::dem::test
