@@ -57,13 +57,14 @@ struct ElasticPlastic {
     return p.damping * sqrt(k.rolling_inertia * stiffness(k, shear_stiffness, p));
   }
 
-  /// @param shear_stiffness  the tangential law's k_t [N/m]
+  /// @param shear  the tangential law's spring. Where it softens, those of rolling and twisting do, and give that share of their torque
+  /// back (see Mindlin::softening)
   /// @return torque on i [N m]; −torque acts on j. `energy`: what the spring stores [J]
   template <class K>
-  static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const typename K::Real& shear_stiffness,
+  static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const ShearSpring<typename K::Real>& shear,
                                  const Parameters& p, History<K>& history, typename K::Real& energy) {
     using Real = typename K::Real;
-    const Real spring = stiffness(k, shear_stiffness, p), dash = dashpot(k, shear_stiffness, p);
+    const Real spring = stiffness(k, shear.stiffness, p), dash = dashpot(k, shear.stiffness, p);
     const Real limit = p.friction * k.reduced_radius * normal_force;
     typename K::Turn turn = k.relative_spin;
     Real twist(0);
@@ -73,14 +74,14 @@ struct ElasticPlastic {
     }
     const auto half = (0.5 * k.step * spring) * turn;
     typename K::Turn elastic;
-    const auto yields = slides_at(turned_with_frame(history.ahead, k) - half, limit, elastic);
+    const auto yields = slides_at(shear.softening * turned_with_frame(history.ahead, k) - half, limit, elastic);
     history.ahead = elastic - half;
     energy = select(spring > Real(0), dot(elastic, elastic) / (2.0 * spring), Real(0));
     typename K::Turn result = elastic - select(yields, Real(0), dash) * turn;
     if constexpr (K::dimension == 3) {
       const Real twisting_spring = p.twisting * spring, half_twist = 0.5 * k.step * twisting_spring * twist;
       Vector<Real, 1> held;
-      const auto twists = slides_at(Vector<Real, 1>{history.twist - half_twist}, p.twisting * limit, held);
+      const auto twists = slides_at(Vector<Real, 1>{shear.softening * history.twist - half_twist}, p.twisting * limit, held);
       history.twist = held.x - half_twist;
       energy = energy + select(twisting_spring > Real(0), held.x * held.x / (2.0 * twisting_spring), Real(0));
       result = result + (held.x - select(twists, Real(0), p.twisting * dash) * twist) * k.normal;

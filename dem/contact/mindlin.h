@@ -39,6 +39,12 @@ struct Mindlin {
     using std::sqrt;
     return 8 * p.shear_modulus * sqrt(k.reduced_radius * k.overlap);
   }
+  /// Where the contact unloads, the spring of the lost area gives its force back: a spring that keeps its force while it softens creates
+  /// energy. @return S_t over that of the last step where it has fallen, else 1
+  template <class K>
+  static typename K::Real softening(const typename K::Real& present, const History<K>& history) {
+    return select(present < history.stiffness, present / history.stiffness, typename K::Real(1));
+  }
   template <class Normal, class K>
   static typename K::Real dashpot(const K& k, const Parameters& p, const typename Normal::Parameters& normal) {
     return p.damping * p.impedance * Normal::impedance(k, normal);
@@ -51,10 +57,8 @@ struct Mindlin {
                                 const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& elastic) {
     using Real = typename K::Real;
     const Real present = stiffness<Normal>(k, p, normal);
-    // Where the contact unloads, the spring of the lost area gives its force back; without this, energy is created.
-    const Real kept = select(present < history.stiffness, present / history.stiffness, Real(1));
     const auto half = (0.5 * k.step * present) * k.slip;
-    const auto trial = kept * turned_with_frame(history.ahead, k) - half;
+    const auto trial = softening(present, history) * turned_with_frame(history.ahead, k) - half;
     const auto result = held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
     history.ahead = elastic - half;
     history.stiffness = present;

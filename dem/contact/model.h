@@ -98,19 +98,21 @@ struct ContactModel {
       const Real elastic = Normal::elastic_force(k, p.normal, history.normal);
       energy->normal_dashpot = select(touches, (response.normal - elastic) * k.closing_speed, Real(0));
     }
-    Real shear_stiffness(0);
+    ShearSpring<Real> shear{Real(0), Real(1)};
     if constexpr (has_friction) {
       typename K::Turn elastic;
-      shear_stiffness = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
+      shear.stiffness = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
+      if constexpr (requires { Tangential::softening(shear.stiffness, history.tangential); })
+        shear.softening = Tangential::softening(shear.stiffness, history.tangential);
       response.shear = Tangential::template force<Normal>(k, response.normal, p.tangential, p.normal, history.tangential, elastic);
       if (energy) {
-        energy->tangential = select(shear_stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear_stiffness), Real(0));
+        energy->tangential = select(shear.stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear.stiffness), Real(0));
         energy->tangential_power = -dot(response.shear, k.slip);
       }
     }
     if constexpr (has_rolling) {
       Real stored;
-      response.torque = Rolling::torque(k, response.normal, shear_stiffness, p.rolling, history.rolling, stored);
+      response.torque = Rolling::torque(k, response.normal, shear, p.rolling, history.rolling, stored);
       response.torque = select(touches, response.torque, zero_vector<Real, K::turns>());
       if (energy) {
         energy->rolling = stored;

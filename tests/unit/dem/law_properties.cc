@@ -20,7 +20,9 @@ class LawProperties : public ::testing::Test {
   using Path = ClosedPath<dimension>;
   static constexpr std::size_t numbers = Model::template history_size<K>();
 
-  static Response respond(const K& k, const typename Model::Parameters& p, History& history, ContactEnergy<double>* energy = nullptr) {
+  // Compiled once, so that the same numbers give the same answer whatever the compiler fuses.
+  [[gnu::noinline]] static Response respond(const K& k, const typename Model::Parameters& p, History& history,
+                                            ContactEnergy<double>* energy = nullptr) {
     auto r = Model::respond(k, p, history, energy);
     if (!Model::has_friction) r.shear = zero_vector<double, K::turns>();
     if (!Model::has_rolling) r.torque = zero_vector<double, K::turns>();
@@ -139,8 +141,8 @@ struct Loss {
 
 TYPED_TEST(LawProperties, NeverGiveEnergy) {
   // On random closed paths of overlap, slip and relative rotation, twice round, what the contact has taken from the bodies beyond
-  // what its springs hold only grows. The trapezoidal rule leaves an error of order (2π/N)² of the energy that is exchanged; the
-  // third harmonic of the paths makes it nine times as large.
+  // what its springs hold only grows. The trapezoidal rule of the work leaves an error of order (2π/N)² of the energy that goes to and
+  // fro, here up to 1.7 times that.
   using T = LawProperties<TypeParam>;
   for (const auto& pair : {soft_glass(), elastic_glass()}) {
     const auto p = T::Model::from(pair);
@@ -156,15 +158,15 @@ TYPED_TEST(LawProperties, NeverGiveEnergy) {
         const auto r = T::respond(k, p, history, &energy);
         loss.add(k, r, energy);
       }
-      EXPECT_LE(loss.rise, 9 * std::pow(2 * M_PI / steps, 2) * loss.largest) << seed << " of " << loss.largest;
+      EXPECT_LE(loss.rise, 2 * std::pow(2 * M_PI / steps, 2) * loss.largest) << seed << " of " << loss.largest;
     }
   }
 }
 
 TYPED_TEST(LawProperties, TheLedgersPowersAreTheWorkOfTheForces) {
   // What the ledger is told of one step must be what forces and motion say: the normal direction's loss is its power less the change
-  // of its stored energy, the others are powers themselves. Differences by the trapezoidal rule: of second order in the step, where
-  // nothing jumps; a jump (contact that stops pulling, a yield that begins) leaves one step's share.
+  // of its stored energy, the others are powers themselves. Over a whole period the trapezoidal rule is exact to round-off where the
+  // loss is smooth; a law that yields starts to lose from one step to the next, which leaves a share of that step.
   using T = LawProperties<TypeParam>;
   const auto p = T::Model::from(soft_glass());
   for (unsigned seed = 1; seed <= 5; ++seed) {
@@ -197,14 +199,16 @@ TYPED_TEST(LawProperties, TheLedgersPowersAreTheWorkOfTheForces) {
       }
       errors[refined] = std::abs(taken - lost - (stored - first)) / scale;
     }
-    EXPECT_LE(errors[0], 20 * 2 * M_PI / 4000) << seed;
-    EXPECT_LE(errors[1], 20 * 2 * M_PI / 16000) << seed;
+    constexpr bool yields = !std::is_empty_v<typename T::Model::Normal::template History<typename T::K>>;
+    EXPECT_LE(errors[0], yields ? 2 * M_PI / 4000 : 1e-12) << seed;
+    EXPECT_LE(errors[1], yields ? 2 * M_PI / 16000 : 1e-12) << seed;
   }
 }
 
 TYPED_TEST(LawProperties, ReturnWhatTheSpringsStored) {
   // Without dashpots and within all limits the way back gives what the way there took. Tangential and rolling springs at constant
-  // overlap, the normal one without slip, so that Mindlin's loss on unloading stays out. Error of the trapezoidal rule, see above.
+  // overlap, the normal one without slip, so that Mindlin's loss on unloading stays out. The trapezoidal rule of a smooth power over a
+  // whole period leaves round-off.
   using T = LawProperties<TypeParam>;
   auto pair = elastic_glass();
   if (std::is_same_v<typename T::Model::Rolling, ConstantTorque>) pair.rolling_friction = 0;  // it has no spring
@@ -224,18 +228,18 @@ TYPED_TEST(LawProperties, ReturnWhatTheSpringsStored) {
         const auto r = T::respond(k, p, history, &energy);
         loss.add(k, r, energy);
       }
-      EXPECT_NEAR(loss.total, 0, 9 * std::pow(2 * M_PI / steps, 2) * loss.largest);
+      EXPECT_NEAR(loss.total, 0, 1e-12 * loss.largest);
       if (along || T::Model::has_friction) { EXPECT_GT(loss.largest, 1e-9); }  // ½ 1e3 N/m (1e-6 m)²
     }
 }
 
 TYPED_TEST(LawProperties, SpringsAreOfSecondOrderInTheStep) {
-  // Force and torque at a third of a closed path, with loading and unloading, sticking; the path is entered without slip and spin.
-  // Halving the step divides the error by 4; 32 times finer steps stand for the exact answer, which moves the ratio by 1/1024.
+  // Force and torque after a third of a path, while the overlap grows or falls, sticking; the path is entered without slip and spin.
+  // Halving the step divides the error by 4; 32 times finer steps stand for the exact answer, which moves the ratio by less than 1 %.
   using T = LawProperties<TypeParam>;
   if constexpr (T::Model::has_friction) {
     const auto p = T::Model::from(elastic_glass());
-    for (unsigned seed = 1; seed <= 5; ++seed) {
+    for (unsigned seed = 1; seed <= 6; ++seed) {
       const typename T::Path path(seed);
       const auto after = [&](int steps) {
         const double step = T::Path::period / 3 / steps;
@@ -244,6 +248,7 @@ TYPED_TEST(LawProperties, SpringsAreOfSecondOrderInTheStep) {
         for (int n = 1; n <= steps; ++n) {
           auto k = path.at(n * step, step);
           const double entry = std::min(1.0, n * step / (T::Path::period / 12)), share = entry * entry * (3 - 2 * entry);
+          k.overlap = path.overlap * (1 + (seed % 2 ? 0.6 : -0.6) * std::pow(double(n) / steps, 2));
           k.slip = share * k.slip;
           k.relative_spin = share * k.relative_spin;
           k.mean_spin = vector_of<T::K::turns>(30 * eigen(k.normal));  // the frame turns about the normal
@@ -263,8 +268,8 @@ TYPED_TEST(LawProperties, SpringsAreOfSecondOrderInTheStep) {
 
 TYPED_TEST(LawProperties, AFrameThatTurnsCarriesTheSpringsAlong) {
   // The same motion, seen from a frame that turns by two radians about an oblique axis: response and history turn with it. Springs are
-  // carried by first-order rotations whose direction is off by a quarter of the square of the tilt in each step (the length is not):
-  // over N steps by 2²/(4 N) of the springs at most, and half of that with half the step.
+  // carried by first-order rotations whose direction, not length, is off by up to a quarter of the square of the tilt in each step:
+  // had a spring been kept all along, by 2²/(4 N); friction and way back make it a seventh of that here. Half of that with half the step.
   using T = LawProperties<TypeParam>;
   if constexpr (T::dimension == 3) {
     const auto p = T::Model::from(soft_glass());
@@ -293,8 +298,8 @@ TYPED_TEST(LawProperties, AFrameThatTurnsCarriesTheSpringsAlong) {
         }
         return std::max(force > 0 ? shear_error / force : 0, torque > 0 ? torque_error / torque : 0);
       };
-      EXPECT_LE(worst(4000), 1.0 / 4000) << seed;
-      EXPECT_LE(worst(8000), 1.0 / 8000) << seed;
+      EXPECT_LE(worst(4000), 0.15 / 4000) << seed;
+      EXPECT_LE(worst(8000), 0.15 / 8000) << seed;
     }
   }
 }
