@@ -6,11 +6,11 @@
 namespace acopla::dem {
 
 void EnergyLedger::step(const ContactEnergy<double>& now, double damping_power, double wall_power, double seconds) {
-  const Powers powers{now.normal_dashpot, now.tangential_power, now.rolling_power, damping_power, wall_power};
+  const Powers powers{now.normal_dashpot, damping_power, wall_power};
   const double half = 0.5 * seconds;
   sums_.lost_normal += half * (last_.normal + powers.normal);
-  tangential_work_ += half * (last_.tangential + powers.tangential);
-  rolling_work_ += half * (last_.rolling + powers.rolling);
+  tangential_work_ += now.tangential_work;
+  rolling_work_ += now.rolling_work;
   sums_.lost_damping += half * (last_.damping + powers.damping);
   sums_.wall_work += half * (last_.walls + powers.walls);
   last_ = powers;

@@ -45,7 +45,7 @@ class EnergyLedger {
 
  private:
   struct Powers {
-    double normal = 0, tangential = 0, rolling = 0, damping = 0, walls = 0;
+    double normal = 0, damping = 0, walls = 0;
   };
   Energy sums_;  // its integrals
   ContactEnergy<double> now_;

@@ -77,65 +77,55 @@ void Engine::set_domain(const Scene& scene) {
 }
 
 void Engine::advance(std::uint64_t steps, double step) {
-  if (!started_) start(step);
+  if (!started_) start();
   else if (outdated_) rebuild();
   loads_.begin();
   for (std::uint64_t k = 0; k < steps; ++k) {
-    if (k == 0) move(step, drift);
-    else move(step, kick_drift);
-    if (walls_.move_at_all()) walls_.move(time_ + step, step);
-    keep_lists(step);
+    move(k == 0 ? 0.5 * step : step, step);
     time_ += step;
+    if (walls_.move_at_all()) walls_.move(time_, step);
+    keep_lists(step);
     if (k + 1 == steps) loads_.begin_last();
     evaluate(step);
   }
-  complete(step);
+  complete(0.5 * step);
   load_ = loads_.finish(walls_, static_cast<double>(steps));
   if (keeps_ledger_) check_energy(step);
 }
 
-void Engine::start(double step) {
+// Forces where the particles are put; no time passes, so no spring of friction moves.
+void Engine::start() {
   rebuild();
   loads_.begin_last();
-  evaluate(step);
-  // The forces of the start are those of a step that ended here.
-  for (auto& partition : partitions_) {
-    take_imports(partition);
-    damp(partition);
-  }
-  particles_.earlier_force.swap(particles_.force);
-  particles_.earlier_torque.swap(particles_.torque);
+  evaluate(0);
+  for (auto& partition : partitions_) complete_forces(partition);
   started_ = true;
   if (keeps_ledger_) energy();
 }
 
-// Moves every partition's particles; the forces of the step before are completed first where they are not yet.
-void Engine::move(double step, Travel (*part)(Particles&, const Vec3&, double, std::uint32_t, std::uint32_t)) {
-  const bool completes = part != drift;
+void Engine::move(double kick, double step) {
   team_.run(static_cast<unsigned>(partitions_.size()), [&](unsigned p) {
     auto& partition = partitions_[p];
-    if (completes) {
-      take_imports(partition);
-      damp(partition);
-    }
-    partition.travel = part(particles_, gravity_, step, partition.first, partition.last);
+    if (!partition.complete) complete_forces(partition);
+    partition.travel = dem::move(particles_, gravity_, kick, step, partition.first, partition.last);
+    partition.complete = false;
   });
-  if (completes) {
-    particles_.earlier_force.swap(particles_.force);
-    particles_.earlier_torque.swap(particles_.torque);
-  }
 }
 
-// Completes the velocities of the last step.
-void Engine::complete(double step) {
+// Velocities at the window's end. The forces stay: the next window begins with them.
+void Engine::complete(double kick) {
   team_.run(static_cast<unsigned>(partitions_.size()), [&](unsigned p) {
     auto& partition = partitions_[p];
-    take_imports(partition);
-    damp(partition);
-    kick(particles_, step, partition.first, partition.last);
+    complete_forces(partition);
+    dem::kick(particles_, gravity_, kick, partition.first, partition.last);
   });
-  particles_.earlier_force.swap(particles_.force);
-  particles_.earlier_torque.swap(particles_.torque);
+}
+
+// What the contacts of other partitions and the damping add to the forces of the contacts here.
+void Engine::complete_forces(Partition& partition) {
+  take_imports(partition);
+  if (!damping_.none()) partition.damping_power = damp(damping_, particles_, gravity_, partition.first, partition.last);
+  partition.complete = true;
 }
 
 void Engine::take_imports(Partition& partition) {
@@ -145,11 +135,6 @@ void Engine::take_imports(Partition& partition) {
     as_vector(particles_.force[import.particle]) += as_vector(exports.force[import.place]);
     if (spins) as_vector(particles_.torque[import.particle]) += as_vector(exports.torque[import.place]);
   }
-}
-
-void Engine::damp(Partition& partition) {
-  if (damping_.none()) return;
-  partition.damping_power = dem::damp(damping_, particles_, gravity_, partition.first, partition.last);
 }
 
 // Looks whether the lists still hold everybody, after the particles have moved.
@@ -205,7 +190,7 @@ void Engine::evaluate(double step) {
     damping += partition.damping_power;
     for (const auto& resultant : partition.walls.resultants()) walls += resultant.power;
   }
-  ledger_.step(sum, damping, walls, started_ ? step : 0);
+  ledger_.step(sum, damping, walls, step);
 }
 
 // Lists who is near whom, in an order that keeps neighbours in memory together, and carries the histories over.
@@ -234,7 +219,7 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
   saved_pairs_.settle(place_, kernels_, particles_.size());
   const auto count = static_cast<std::uint32_t>(particles_.size());
   const auto parts = static_cast<std::uint32_t>(partitions_.size());
-  walls_.mark(domain_.low, domain_.high);
+  walls_.mark(domain_.low, domain_.high, largest_);
   team_.run(parts, [&](unsigned p) {
     auto& partition = partitions_[p];
     partition.first = static_cast<std::uint32_t>(std::uint64_t{count} * p / parts);
@@ -380,14 +365,14 @@ Vec3 Engine::momentum() const {
 Energy Engine::energy() { return ledger_.balance(kinetic_energy(), potential_energy()); }
 
 StepRatio Engine::step_ratio(double step) const {
-  StabilityEstimate estimate(particles_);
+  StabilityEstimate estimate(particles_, step);
   for_each_pair([&](std::uint32_t i, std::uint32_t j, double overlap) {
     estimate.add_pair(i, j, overlap, kernels_.of(particles_.material[i], particles_.material[j]));
   });
   for (const auto& partition : partitions_)
     partition.walls.for_each_contact([&](std::uint32_t i, std::uint8_t material, std::uint8_t wall, double overlap, const Vec3& normal,
                                          double curvature) { estimate.add_wall(i, overlap, normal, curvature, kernels_.of(material, wall)); });
-  return estimate.worst(step);
+  return estimate.worst();
 }
 
 void Engine::check_domain() const {

@@ -106,6 +106,7 @@ class Engine {
     ContactEnergy<double> energy;  // of this step
     double damping_power = 0;
     Travel travel;
+    bool complete = false;  // the forces hold all that acts
 
     template <class Archive>
     void state(Archive& archive) {
@@ -115,16 +116,17 @@ class Engine {
       archive("second", rows.second);
       archive("pairs", pairs);
       archive("walls", walls);
+      archive("complete", complete);
     }
   };
 
-  void start(double step);
+  void start();
   void set_domain(const Scene& scene);
   void set_sizes();
-  void move(double step, Travel (*part)(Particles&, const Vec3&, double, std::uint32_t, std::uint32_t));
-  void complete(double step);
+  void move(double kick, double step);
+  void complete(double kick);
+  void complete_forces(Partition& partition);
   void take_imports(Partition& partition);
-  void damp(Partition& partition);
   void keep_lists(double step);
   void evaluate(double step);
   void rebuild(const std::vector<std::uint32_t>* stay = nullptr);

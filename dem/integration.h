@@ -1,6 +1,6 @@
-// Moving the particles: velocity Verlet with predicted velocities, which is leapfrog for forces of position and stays of second order
-// with dashpots (Groot & Warren 1997, λ = 1):
-//   x += v Δt + a Δt²/2,  ṽ = v + a Δt,  a' = F(x, ṽ)/m + g,  v = ṽ + (a' − a) Δt/2.
+// Moving the particles: leapfrog.
+//   v_{n+½} = v_{n−½} + a_n Δt,  x_{n+1} = x_n + v_{n+½} Δt,  a_n = F_n/m + g,
+// with v_½ = v_0 + a_0 Δt/2 at the start of a window and v_N = v_{N−½} + a_N Δt/2 at its end.
 #pragma once
 
 #include "dem/particles.h"
@@ -17,13 +17,10 @@ struct Travel {
   }
 };
 
-/// One part of a step, for the particles first … last − 1.
-///  drift: from a whole step, moves positions and predicts velocities; reads earlier_force, leaves force as it is.
-///  kick: completes the velocities with the forces summed at the new positions.
-/// Between whole steps earlier_force holds the forces of the last step and force is zero; kick_drift() does both in one pass and
-/// leaves zeros in earlier_force. After kick() and after kick_drift() the caller swaps the two arrays, of forces and of torques.
-Travel drift(Particles& particles, const Vec3& gravity, double step, std::uint32_t first, std::uint32_t last);
-void kick(Particles& particles, double step, std::uint32_t first, std::uint32_t last);
-Travel kick_drift(Particles& particles, const Vec3& gravity, double step, std::uint32_t first, std::uint32_t last);
+/// For the particles first … last − 1: velocities by `kick` [s] with the forces there are, then positions by `step` [s]; the forces are
+/// used up, and zero afterwards.
+Travel move(Particles& particles, const Vec3& gravity, double kick, double step, std::uint32_t first, std::uint32_t last);
+/// Velocities alone; the forces stay.
+void kick(Particles& particles, const Vec3& gravity, double kick, std::uint32_t first, std::uint32_t last);
 
 }  // namespace acopla::dem

@@ -8,11 +8,12 @@
 
 #include "dem/contact/model.h"
 #include "dem/particles.h"
+#include "dem/simd.h"
 
 namespace acopla::dem {
 
 /// Storage of histories: packs of `lanes` contacts, each pack one row a stored number.
-struct alignas(32) HistoryLane {
+struct alignas(8 * lanes) HistoryLane {
   double value[lanes];
 };
 

@@ -11,11 +11,9 @@ void Particles::add(const Vec3& at, double radius, double density, std::uint8_t 
   position.push_back({at[0], at[1], at[2], radius});
   velocity.push_back({with_velocity[0], with_velocity[1], kind.dimension == 2 ? with_spin[2] : with_velocity[2], mass});
   force.emplace_back();
-  earlier_force.emplace_back();
   if (has_spins()) {
     spin.push_back({with_spin[0], with_spin[1], with_spin[2], 0.4 * mass * radius * radius});
     torque.emplace_back();
-    earlier_torque.emplace_back();
   }
   id.push_back(next_id++);
   material.push_back(of_material);
@@ -39,8 +37,6 @@ void Particles::reorder(const std::vector<std::uint32_t>& order) {
   sort(spin);
   sort(force);
   sort(torque);
-  sort(earlier_force);
-  sort(earlier_torque);
   sort(id);
   sort(material);
 }

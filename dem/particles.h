@@ -37,12 +37,10 @@ struct ParticleKind {
 struct Particles {
   ParticleKind kind;
   std::vector<Record> position;        ///< [m]; w: radius [m]
-  std::vector<Record> velocity;        ///< [m/s]; w: mass [kg]. Predicted to the step's end while forces are summed
+  std::vector<Record> velocity;        ///< [m/s]; w: mass [kg]. Of the last half step while forces are summed, of the whole step between windows
   std::vector<Record> spin;            ///< [rad/s]; w: moment of inertia [kg m²]; spheres that rotate only
   std::vector<Record> force;           ///< contact force [N]
   std::vector<Record> torque;          ///< about the centre [N m]; spheres that rotate only
-  std::vector<Record> earlier_force;   ///< of the last completed step
-  std::vector<Record> earlier_torque;
   std::vector<std::uint32_t> id;
   std::vector<std::uint8_t> material;
 
@@ -68,7 +66,7 @@ struct Particles {
   double inertia_of(std::size_t i) const { return (kind.dimension == 2 ? 0.5 : 0.4) * mass_of(i) * radius_of(i) * radius_of(i); }
 
   /// Bytes a particle in the arrays above.
-  std::size_t bytes_each() const { return (has_spins() ? 7 : 4) * sizeof(Record) + sizeof(std::uint32_t) + sizeof(std::uint8_t); }
+  std::size_t bytes_each() const { return (has_spins() ? 5 : 3) * sizeof(Record) + sizeof(std::uint32_t) + sizeof(std::uint8_t); }
 
   template <class Archive>
   void state(Archive& archive) {
@@ -77,8 +75,6 @@ struct Particles {
     archive("spin", spin);
     archive("force", force);
     archive("torque", torque);
-    archive("earlier_force", earlier_force);
-    archive("earlier_torque", earlier_torque);
     archive("id", id);
     archive("material", material);
     archive("next_id", next_id);

@@ -1,8 +1,12 @@
 // Packs of doubles. The only file that knows how: GCC's vector types, which become AVX-512, AVX or pairs of SSE2 registers, as the
 // build has them. (std::experimental::simd has no gather and no permute.)
+//
+// The pack is as wide as the machine's registers. Eight lanes pay beyond the arithmetic: a contact law is one long chain of roots and
+// quotients, and what a processor can look ahead holds little more than one pack of it.
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "dem/particles.h"
@@ -13,79 +17,174 @@
 
 namespace acopla::dem {
 
-struct Mask4 {
-  using Vector = long long __attribute__((vector_size(32)));
-  Vector v;
-  friend Mask4 operator&(const Mask4& a, const Mask4& b) { return {a.v & b.v}; }
-};
-
-struct Double4 {
-  using Vector = double __attribute__((vector_size(32)));
-  Vector v;
-  Double4() = default;
-  Double4(double all) : v{all, all, all, all} {}  // NOLINT: a scalar is meant to mix with vectors
-  explicit Double4(const Vector& vector) : v(vector) {}
-  double operator[](int lane) const { return v[lane]; }
-
-  friend Double4 operator+(const Double4& a, const Double4& b) { return Double4(a.v + b.v); }
-  friend Double4 operator-(const Double4& a, const Double4& b) { return Double4(a.v - b.v); }
-  friend Double4 operator*(const Double4& a, const Double4& b) { return Double4(a.v * b.v); }
-  friend Double4 operator/(const Double4& a, const Double4& b) { return Double4(a.v / b.v); }
-  friend Double4 operator-(const Double4& a) { return Double4(-a.v); }
-  friend Mask4 operator<(const Double4& a, const Double4& b) { return {a.v < b.v}; }
-  friend Mask4 operator>(const Double4& a, const Double4& b) { return {a.v > b.v}; }
-};
-
 /// Contacts of a pack.
+#ifdef __AVX512F__
+inline constexpr std::size_t lanes = 8;
+#else
 inline constexpr std::size_t lanes = 4;
+#endif
+
+struct MaskPack {
+  using Vector = long long __attribute__((vector_size(8 * lanes)));
+  Vector v;
+  friend MaskPack operator&(const MaskPack& a, const MaskPack& b) { return {a.v & b.v}; }
+};
+
+struct DoublePack {
+  using Vector = double __attribute__((vector_size(8 * lanes)));
+  Vector v;
+  DoublePack() = default;
+  DoublePack(double all) : v(Vector{} + all) {}  // NOLINT: a scalar is meant to mix with vectors
+  explicit DoublePack(const Vector& vector) : v(vector) {}
+  double operator[](std::size_t lane) const { return v[lane]; }
+
+  friend DoublePack operator+(const DoublePack& a, const DoublePack& b) { return DoublePack(a.v + b.v); }
+  friend DoublePack operator-(const DoublePack& a, const DoublePack& b) { return DoublePack(a.v - b.v); }
+  friend DoublePack operator*(const DoublePack& a, const DoublePack& b) { return DoublePack(a.v * b.v); }
+  friend DoublePack operator/(const DoublePack& a, const DoublePack& b) { return DoublePack(a.v / b.v); }
+  friend DoublePack operator-(const DoublePack& a) { return DoublePack(-a.v); }
+  friend MaskPack operator<(const DoublePack& a, const DoublePack& b) { return {a.v < b.v}; }
+  friend MaskPack operator==(const DoublePack& a, const DoublePack& b) { return {a.v == b.v}; }
+  friend MaskPack operator>(const DoublePack& a, const DoublePack& b) { return {a.v > b.v}; }
+};
 
 /// Lane by lane: where the mask holds `yes`, else `no`. Both are computed.
-inline Double4 select(const Mask4& mask, const Double4& yes, const Double4& no) { return Double4(mask.v ? yes.v : no.v); }
+inline DoublePack select(const MaskPack& mask, const DoublePack& yes, const DoublePack& no) { return DoublePack(mask.v ? yes.v : no.v); }
 inline double select(bool mask, double yes, double no) { return mask ? yes : no; }
 
-inline Double4 max(const Double4& a, const Double4& b) { return Double4(a.v > b.v ? a.v : b.v); }
-inline Double4 min(const Double4& a, const Double4& b) { return Double4(a.v < b.v ? a.v : b.v); }
+inline DoublePack max(const DoublePack& a, const DoublePack& b) { return DoublePack(a.v > b.v ? a.v : b.v); }
+inline DoublePack min(const DoublePack& a, const DoublePack& b) { return DoublePack(a.v < b.v ? a.v : b.v); }
 
-inline Double4 sqrt(const Double4& a) {
-#ifdef __AVX__
-  return Double4(static_cast<Double4::Vector>(_mm256_sqrt_pd(static_cast<__m256d>(a.v))));
+inline DoublePack sqrt(const DoublePack& a) {
+#if defined(__AVX512F__)
+  return DoublePack(static_cast<DoublePack::Vector>(_mm512_sqrt_pd(static_cast<__m512d>(a.v))));
+#elif defined(__AVX__)
+  return DoublePack(static_cast<DoublePack::Vector>(_mm256_sqrt_pd(static_cast<__m256d>(a.v))));
 #else
-  return Double4(Double4::Vector{std::sqrt(a.v[0]), std::sqrt(a.v[1]), std::sqrt(a.v[2]), std::sqrt(a.v[3])});
+  DoublePack root;
+  for (std::size_t lane = 0; lane < lanes; ++lane) root.v[lane] = std::sqrt(a.v[lane]);
+  return root;
 #endif
 }
 
-inline double sum(const Double4& a) { return (a.v[0] + a.v[1]) + (a.v[2] + a.v[3]); }
-
-/// Four records as four components: what four contacts need, in four loads and eight shuffles.
-struct Record4 {
-  Double4 x, y, z, w;
-};
-
-inline Record4 transposed(const Double4::Vector& a, const Double4::Vector& b, const Double4::Vector& c, const Double4::Vector& d) {
-  const auto ab_even = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab_odd = __builtin_shufflevector(a, b, 1, 5, 3, 7);
-  const auto cd_even = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd_odd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
-  return {Double4(__builtin_shufflevector(ab_even, cd_even, 0, 1, 4, 5)), Double4(__builtin_shufflevector(ab_odd, cd_odd, 0, 1, 4, 5)),
-          Double4(__builtin_shufflevector(ab_even, cd_even, 2, 3, 6, 7)), Double4(__builtin_shufflevector(ab_odd, cd_odd, 2, 3, 6, 7))};
+inline double sum(const DoublePack& a) {
+  double total = 0;
+  for (std::size_t lane = 0; lane < lanes; ++lane) total += a.v[lane];
+  return total;
 }
 
-// A record is four aligned doubles, so it may be read and written as one vector.
+/// 1 in the first `count` lanes, 0 in the others.
+inline DoublePack first_lanes(std::size_t count) {
+  DoublePack ones;
+  for (std::size_t lane = 0; lane < lanes; ++lane) ones.v[lane] = lane < count ? 1.0 : 0.0;
+  return ones;
+}
+
+/// Lanes from memory; `at` need not be aligned.
+inline DoublePack load(const double* at) {
+  using Unaligned = double __attribute__((vector_size(8 * lanes), aligned(8), may_alias));
+  return DoublePack(*reinterpret_cast<const Unaligned*>(at));
+}
+inline void store(double* at, const DoublePack& value) {
+  using Unaligned = double __attribute__((vector_size(8 * lanes), aligned(8), may_alias));
+  *reinterpret_cast<Unaligned*>(at) = value.v;
+}
+
+/// A record is four aligned doubles, so it may be read and written as one vector.
 using RecordVector = double __attribute__((vector_size(32), may_alias));
 inline const RecordVector& as_vector(const Record& record) { return reinterpret_cast<const RecordVector&>(record); }
 inline RecordVector& as_vector(Record& record) { return reinterpret_cast<RecordVector&>(record); }
 
-inline Record4 gathered(const Record* records, const std::uint32_t* four) {
-  return transposed(as_vector(records[four[0]]), as_vector(records[four[1]]), as_vector(records[four[2]]), as_vector(records[four[3]]));
-}
-inline Record4 loaded(const Record* four) { return transposed(as_vector(four[0]), as_vector(four[1]), as_vector(four[2]), as_vector(four[3])); }
+/// A record a lane, by components: what a pack of contacts needs.
+struct RecordPack {
+  DoublePack x, y, z, w;
+};
 
-/// Lanes from memory; `at` need not be aligned.
-inline Double4 load(const double* at) {
-  using Unaligned = double __attribute__((vector_size(32), aligned(8), may_alias));
-  return Double4(*reinterpret_cast<const Unaligned*>(at));
+namespace simd {
+
+using Vector = DoublePack::Vector;
+
+/// Four rows, one a record (of eight lanes: a record in either half), from and to four components. Its own inverse.
+inline RecordPack transposed(const Vector& a, const Vector& b, const Vector& c, const Vector& d) {
+#ifdef __AVX512F__
+  const auto ab_even = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14), ab_odd = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+  const auto cd_even = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14), cd_odd = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+  return {DoublePack(__builtin_shufflevector(ab_even, cd_even, 0, 1, 8, 9, 4, 5, 12, 13)),
+          DoublePack(__builtin_shufflevector(ab_odd, cd_odd, 0, 1, 8, 9, 4, 5, 12, 13)),
+          DoublePack(__builtin_shufflevector(ab_even, cd_even, 2, 3, 10, 11, 6, 7, 14, 15)),
+          DoublePack(__builtin_shufflevector(ab_odd, cd_odd, 2, 3, 10, 11, 6, 7, 14, 15))};
+#else
+  const auto ab_even = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab_odd = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+  const auto cd_even = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd_odd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+  return {DoublePack(__builtin_shufflevector(ab_even, cd_even, 0, 1, 4, 5)), DoublePack(__builtin_shufflevector(ab_odd, cd_odd, 0, 1, 4, 5)),
+          DoublePack(__builtin_shufflevector(ab_even, cd_even, 2, 3, 6, 7)), DoublePack(__builtin_shufflevector(ab_odd, cd_odd, 2, 3, 6, 7))};
+#endif
 }
-inline void store(double* at, const Double4& value) {
-  using Unaligned = double __attribute__((vector_size(32), aligned(8), may_alias));
-  *reinterpret_cast<Unaligned*>(at) = value.v;
+
+#ifdef __AVX512F__
+// By intrinsics: GCC 12 takes the general shuffle of two halves through memory.
+inline Vector joined(const Record& low, const Record& high) {
+  return static_cast<Vector>(_mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(&low.x)), _mm256_load_pd(&high.x), 1));
+}
+inline RecordVector low_half(const Vector& v) { return static_cast<RecordVector>(_mm512_castpd512_pd256(static_cast<__m512d>(v))); }
+inline RecordVector high_half(const Vector& v) { return static_cast<RecordVector>(_mm512_extractf64x4_pd(static_cast<__m512d>(v), 1)); }
+#endif
+
+/// Calls action(lane, row) for the rows of the first `count` records.
+template <class Action>
+inline void for_each_row(const RecordPack& values, std::size_t count, Action&& action) {
+  const auto rows = transposed(values.x.v, values.y.v, values.z.v, values.w.v);
+  const Vector* row[4] = {&rows.x.v, &rows.y.v, &rows.z.v, &rows.w.v};
+#ifdef __AVX512F__
+  if (count == lanes) {
+    action(0, low_half(rows.x.v));
+    action(1, low_half(rows.y.v));
+    action(2, low_half(rows.z.v));
+    action(3, low_half(rows.w.v));
+    action(4, high_half(rows.x.v));
+    action(5, high_half(rows.y.v));
+    action(6, high_half(rows.z.v));
+    action(7, high_half(rows.w.v));
+    return;
+  }
+  for (std::size_t lane = 0; lane < count; ++lane) action(lane, lane < 4 ? low_half(*row[lane]) : high_half(*row[lane - 4]));
+#else
+  if (count == lanes) {
+    action(0, rows.x.v);
+    action(1, rows.y.v);
+    action(2, rows.z.v);
+    action(3, rows.w.v);
+    return;
+  }
+  for (std::size_t lane = 0; lane < count; ++lane) action(lane, *row[lane]);
+#endif
+}
+
+}  // namespace simd
+
+inline RecordPack gathered(const Record* records, const std::uint32_t* which) {
+#ifdef __AVX512F__
+  using simd::joined;
+  return simd::transposed(joined(records[which[0]], records[which[4]]), joined(records[which[1]], records[which[5]]),
+                          joined(records[which[2]], records[which[6]]), joined(records[which[3]], records[which[7]]));
+#else
+  return simd::transposed(as_vector(records[which[0]]), as_vector(records[which[1]]), as_vector(records[which[2]]), as_vector(records[which[3]]));
+#endif
+}
+
+/// Records that lie one after another.
+inline RecordPack loaded(const Record* records) {
+  static constexpr std::uint32_t all[] = {0, 1, 2, 3, 4, 5, 6, 7};
+  return gathered(records, all);
+}
+
+/// Adds to the records of the first `count` lanes, one after another, since lanes may share a record.
+inline void add_to(Record* records, const std::uint32_t* which, std::size_t count, const RecordPack& values) {
+  simd::for_each_row(values, count, [&](std::size_t lane, const auto& row) { as_vector(records[which[lane]]) += row; });
+}
+/// Writes `count` records one after another.
+inline void write(Record* records, std::size_t count, const RecordPack& values) {
+  simd::for_each_row(values, count, [&](std::size_t lane, const auto& row) { as_vector(records[lane]) = row; });
 }
 
 }  // namespace acopla::dem

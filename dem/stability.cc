@@ -1,52 +1,84 @@
 #include "dem/stability.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace acopla::dem {
 
-StabilityEstimate::StabilityEstimate(const Particles& particles) : particles_(particles), sums_(particles.size()) {}
+StabilityEstimate::StabilityEstimate(const Particles& particles, double step)
+    : particles_(particles), step_(step), place_(particles.size(), ~0u) {}
 
 void StabilityEstimate::add_pair(std::uint32_t i, std::uint32_t j, double overlap, const Kernel& kernel) {
   const double r_i = particles_.radius_of(i), r_j = particles_.radius_of(j), m_i = particles_.mass_of(i), m_j = particles_.mass_of(j);
   const double at_i = particles_.inertia_of(i) + m_i * r_i * r_i, at_j = particles_.inertia_of(j) + m_j * r_j * r_j;
   const auto contact = kernel.stiffness(overlap, r_i * r_j / (r_i + r_j), m_i * m_j / (m_i + m_j), at_i * at_j / (at_i + at_j));
   const Vec3 normal = (particles_.position[i].vector() - particles_.position[j].vector()).normalized();
-  add(i, normal, contact, 2);
-  add(j, normal, contact, 2);
+  add(i, normal, r_i - 0.5 * overlap, contact, 2);
+  add(j, -normal, r_j - 0.5 * overlap, contact, 2);
 }
 
 void StabilityEstimate::add_wall(std::uint32_t i, double overlap, const Vec3& normal, double curvature, const Kernel& kernel) {
   const double r = particles_.radius_of(i), m = particles_.mass_of(i);
-  add(i, normal, kernel.stiffness(overlap, r / (1 + r * curvature), m, particles_.inertia_of(i) + m * r * r), 1);
+  add(i, normal, r - overlap, kernel.stiffness(overlap, r / (1 + r * curvature), m, particles_.inertia_of(i) + m * r * r), 1);
 }
 
-void StabilityEstimate::add(std::uint32_t i, const Vec3& normal, const ContactStiffness& contact, double bodies) {
-  auto& sums = sums_[i];
-  const double turning = 1 + (particles_.kind.dimension == 2 ? 2.0 : 2.5);  // 1 + m r²/I
-  const Eigen::Matrix3d along = normal * normal.transpose();
-  Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along;
-  if (particles_.kind.dimension == 2) across(2, 2) = 0;
-  sums.stiffness += bodies * (contact.normal * along + turning * contact.shear * across);
-  sums.dashpot += bodies * (contact.normal_dashpot * along + turning * contact.shear_dashpot * across);
-  sums.rolling += bodies * contact.rolling;
-  sums.rolling_dashpot += bodies * contact.rolling_dashpot;
-  sums.touched = true;
+void StabilityEstimate::add(std::uint32_t i, const Vec3& normal, double arm, const ContactStiffness& contact, double bodies) {
+  if (place_[i] == ~0u) {
+    place_[i] = static_cast<std::uint32_t>(sums_.size());
+    sums_.emplace_back();
+    particle_.push_back(i);
+  }
+  auto& sums = sums_[place_[i]];
+  // In coordinates scaled by the roots of mass and inertia. Slip of i's surface: u − n (n·u) − arm θ × n.
+  const double per_mass = 1 / std::sqrt(particles_.mass_of(i)), per_inertia = 1 / std::sqrt(particles_.inertia_of(i));
+  Eigen::Matrix<double, 1, 6> closing = Eigen::Matrix<double, 1, 6>::Zero();
+  closing.head<3>() = per_mass * normal.transpose();
+  Eigen::Matrix<double, 3, 6> slip, turn = Eigen::Matrix<double, 3, 6>::Zero();
+  slip.leftCols<3>() = per_mass * (Eigen::Matrix3d::Identity() - normal * normal.transpose());
+  Eigen::Matrix3d across;
+  across << 0, -normal[2], normal[1], normal[2], 0, -normal[0], -normal[1], normal[0], 0;
+  slip.rightCols<3>() = per_inertia * arm * across;
+  turn.rightCols<3>() = per_inertia * Eigen::Matrix3d::Identity();
+  if (particles_.kind.dimension == 2) {  // discs move in the plane and turn about its axis
+    slip.col(2).setZero();
+    slip.col(3).setZero();
+    slip.col(4).setZero();
+    turn.col(3).setZero();
+    turn.col(4).setZero();
+  }
+  const double square = bodies * step_ * step_, twice = 2 * bodies * step_;
+  sums.stiffness += square * contact.normal * closing.transpose() * closing;
+  sums.dashpot += 2 * twice * contact.normal_dashpot * closing.transpose() * closing;
+  if (contact.shear > 0) {
+    sums.stiffness += square * contact.shear * slip.transpose() * slip;
+    sums.dashpot += twice * contact.shear_dashpot * slip.transpose() * slip;
+  }
+  if (contact.rolling > 0) {
+    sums.stiffness += square * contact.rolling * turn.transpose() * turn;
+    sums.dashpot += twice * contact.rolling_dashpot * turn.transpose() * turn;
+  }
 }
 
-StepRatio StabilityEstimate::worst(double step) const {
+StepRatio StabilityEstimate::worst() const {
+  // The Frobenius norm bounds the largest eigenvalue: eigenvalues are needed only while a norm exceeds the largest found.
+  std::vector<double> norm(sums_.size());
+  std::vector<std::uint32_t> order(sums_.size());
+  std::iota(order.begin(), order.end(), 0u);
+  for (std::size_t k = 0; k < sums_.size(); ++k) norm[k] = (sums_[k].stiffness + sums_[k].dashpot).norm();
+  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return norm[a] > norm[b]; });
+  double largest = 0;
   StepRatio worst;
-  for (std::size_t i = 0; i < sums_.size(); ++i) {
-    if (!sums_[i].touched) continue;
-    const double mass = particles_.mass_of(i), inertia = particles_.inertia_of(i);
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-    const auto largest = [&](const Eigen::Matrix3d& matrix) { return solver.computeDirect(matrix, Eigen::EigenvaluesOnly).eigenvalues()[2]; };
-    const double square = largest(sums_[i].stiffness) / mass + sums_[i].rolling / inertia;
-    if (!(square > 0)) continue;
-    const double omega = std::sqrt(square);
-    const double zeta = (largest(sums_[i].dashpot) / mass + sums_[i].rolling_dashpot / inertia) / (2 * omega);
-    const double ratio = step * omega / (2 * (std::sqrt(1 + zeta * zeta) - zeta));
-    if (ratio > worst.value) worst = {ratio, i};
+  for (const auto k : order) {
+    if (norm[k] <= largest) break;
+    const Eigen::SelfAdjointEigenSolver<Block> solver(sums_[k].stiffness + sums_[k].dashpot);
+    if (solver.eigenvalues()[5] <= largest) continue;
+    largest = solver.eigenvalues()[5];
+    // The limit is s Δt with s² a + s b = 4 along this eigenvector.
+    const Eigen::Matrix<double, 6, 1> mode = solver.eigenvectors().col(5);
+    const double a = mode.dot(sums_[k].stiffness * mode), b = mode.dot(sums_[k].dashpot * mode);
+    worst = {(b + std::sqrt(b * b + 16 * a)) / 8, particle_[k]};
   }
   return worst;
 }

@@ -9,32 +9,35 @@
 namespace acopla::dem {
 
 struct StepRatio {
-  double value = 0;            ///< Δt over the limit; 0 without contacts
+  double value = 0;            ///< Δt over a bound of its stability limit; 0 without contacts
   std::size_t particle = 0;    ///< the worst one's index
 };
 
-/// Bounds the stability limit of a bed by its particles, one by one. For the undamped bed λ_max(M⁻¹K) ≤ max_i λ_i with
-///   λ_i = 2/m_i · λ_max(Σ k_n n nᵀ + (1 + m_i a²/I_i) k_t (1 − n nᵀ)) + 2/I_i Σ k_r
-/// over the contacts of particle i (a = r, the arm; 1 in place of the leading 2 for a wall, which does not move): each contact's
-/// energy is split between its two bodies by (x + y)² ≤ 2 x² + 2 y², and the tangential one between translation and rotation in the
-/// proportion that weighs both alike. The dashpots are summed alike, c_i = λ_max of the same matrices of c; with ω² = λ_i and
-/// ζ = c_i / (2 m_i ω) the limit is (2/ω)(sqrt(1 + ζ²) − ζ).
+/// Bounds the stability limit of a bed by its particles, one by one.
+///
+/// For leapfrog with springs that follow the motion exactly, normal dashpots at the extrapolated rate and the others at the rate of the
+/// half step, a mode with stiffness κ, mass 1 and dashpots γ_n, γ_t is stable while Δt² κ + 2 Δt (2 γ_n + γ_t) ≤ 4 (the characteristic
+/// polynomials at z = −1; for the lagged dashpot alone this is (2/ω)(sqrt(1 + ζ²) − ζ)). For the whole bed the largest eigenvalue of
+/// M⁻¹(Δt² K + 2 Δt (2 C_n + C_t)) decides. It is at most the largest over the particles of that of their own blocks, translation and
+/// rotation together, with pairs counted twice and walls once: (x + y)² ≤ 2 x² + 2 y² for the two bodies of each contact.
 class StabilityEstimate {
  public:
-  explicit StabilityEstimate(const Particles& particles);
+  StabilityEstimate(const Particles& particles, double step);
   void add_pair(std::uint32_t i, std::uint32_t j, double overlap, const Kernel& kernel);
   void add_wall(std::uint32_t i, double overlap, const Vec3& normal, double curvature, const Kernel& kernel);
-  StepRatio worst(double step) const;
+  StepRatio worst() const;
 
  private:
-  void add(std::uint32_t i, const Vec3& normal, const ContactStiffness& contact, double bodies);
+  using Block = Eigen::Matrix<double, 6, 6>;
   struct Sums {
-    Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), dashpot = Eigen::Matrix3d::Zero();
-    double rolling = 0, rolling_dashpot = 0;
-    bool touched = false;
+    Block stiffness = Block::Zero(), dashpot = Block::Zero();  // Δt² K and 2 Δt (2 C_n + C_t), over mass and inertia
   };
+  void add(std::uint32_t i, const Vec3& normal, double arm, const ContactStiffness& contact, double bodies);
   const Particles& particles_;
+  double step_;
+  std::vector<std::uint32_t> place_;  // in sums_, of a particle with contacts
   std::vector<Sums> sums_;
+  std::vector<std::uint32_t> particle_;
 };
 
 }  // namespace acopla::dem

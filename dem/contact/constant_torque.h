@@ -28,10 +28,10 @@ struct ConstantTorque {
   static constexpr double share = 0.125;
 
   /// @param normal_force  [N]
-  /// @return torque on i [N m]; −torque acts on j. `energy`: what a spring stores [J]
+  /// @return torque on i [N m]; −torque acts on j. `energy`: what a spring stores [J]; `work`: what was taken in the step [J]
   template <class K>
   static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const ShearSpring<typename K::Real>&, const Parameters& p,
-                                 History<K>&, typename K::Real& energy) {
+                                 History<K>&, typename K::Real& energy, typename K::Real& work) {
     using std::min, std::sqrt;
     using Real = typename K::Real;
     energy = Real(0);
@@ -39,7 +39,9 @@ struct ConstantTorque {
     // As a factor of the relative spin: what the law asks over |ω|, or the cap, whichever is less.
     const Real cap = (share / k.step) * k.reduced_inertia;
     const Real asked = select(spin > Real(0), p.friction * normal_force * k.reduced_radius / spin, Real(0));
-    return -min(asked, cap) * k.relative_spin;
+    const Real factor = min(asked, cap);
+    work = k.step * factor * spin * spin;
+    return -factor * k.relative_spin;
   }
 };
 

@@ -28,15 +28,14 @@ struct ElasticPlastic {
     return {pair.rolling_friction, 2 * pair.rolling_values[0], pair.rolling_values[1], pair.rolling_values[2]};
   }
 
-  /// Elastic rolling torque on i half an increment ahead (see Mindlin) [N m]; in three dimensions also the twisting torque along the
-  /// normal.
+  /// Elastic rolling torque on i [N m]; in three dimensions also the twisting torque along the normal.
   template <class K, int dimension = K::dimension>
   struct History {
-    typename K::Turn ahead;
+    typename K::Turn torque;
   };
   template <class K>
   struct History<K, 3> {
-    typename K::Turn ahead;
+    typename K::Turn torque;
     typename K::Real twist;
   };
   template <int dimension>
@@ -58,13 +57,14 @@ struct ElasticPlastic {
   }
 
   /// @param shear  the tangential law's spring. Where it softens, those of rolling and twisting do, and give that share of their torque
-  /// back (see Mindlin::softening)
-  /// @return torque on i [N m]; −torque acts on j. `energy`: what the spring stores [J]
+  /// back (see Mindlin::spring)
+  /// @return torque on i [N m]; −torque acts on j. `energy`: what the springs store [J]; `work`: what they took in the step [J]
   template <class K>
   static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const ShearSpring<typename K::Real>& shear,
-                                 const Parameters& p, History<K>& history, typename K::Real& energy) {
+                                 const Parameters& p, History<K>& history, typename K::Real& energy, typename K::Real& work) {
     using Real = typename K::Real;
     const Real spring = stiffness(k, shear.stiffness, p), dash = dashpot(k, shear.stiffness, p);
+    const Real increment = k.step * stiffness(k, shear.increment, p);
     const Real limit = p.friction * k.reduced_radius * normal_force;
     typename K::Turn turn = k.relative_spin;
     Real twist(0);
@@ -72,19 +72,21 @@ struct ElasticPlastic {
       twist = dot(turn, k.normal);
       turn = turn - twist * k.normal;
     }
-    const auto half = (0.5 * k.step * spring) * turn;
-    typename K::Turn elastic;
-    const auto yields = slides_at(shear.softening * turned_with_frame(history.ahead, k) - half, limit, elastic);
-    history.ahead = elastic - half;
-    energy = select(spring > Real(0), dot(elastic, elastic) / (2.0 * spring), Real(0));
-    typename K::Turn result = elastic - select(yields, Real(0), dash) * turn;
+    const auto before = turned_with_frame(history.torque, k);
+    const auto yields = slides_at(shear.softening * before - increment * turn, limit, history.torque);
+    const typename K::Turn damping = select(yields, Real(0), dash) * turn;
+    energy = select(spring > Real(0), dot(history.torque, history.torque) / (2.0 * spring), Real(0));
+    work = k.step * dot(damping - Real(0.5) * (before + history.torque), turn);
+    typename K::Turn result = history.torque - damping;
     if constexpr (K::dimension == 3) {
-      const Real twisting_spring = p.twisting * spring, half_twist = 0.5 * k.step * twisting_spring * twist;
-      Vector<Real, 1> held;
-      const auto twists = slides_at(Vector<Real, 1>{shear.softening * history.twist - half_twist}, p.twisting * limit, held);
-      history.twist = held.x - half_twist;
-      energy = energy + select(twisting_spring > Real(0), held.x * held.x / (2.0 * twisting_spring), Real(0));
-      result = result + (held.x - select(twists, Real(0), p.twisting * dash) * twist) * k.normal;
+      const Real twisting = p.twisting * spring, held = history.twist;
+      Vector<Real, 1> kept;
+      const auto twists = slides_at(Vector<Real, 1>{shear.softening * held - p.twisting * increment * twist}, p.twisting * limit, kept);
+      const Real twist_damping = select(twists, Real(0), p.twisting * dash) * twist;
+      history.twist = kept.x;
+      energy = energy + select(twisting > Real(0), kept.x * kept.x / (2.0 * twisting), Real(0));
+      work = work + k.step * (twist_damping - 0.5 * (held + kept.x)) * twist;
+      result = result + (kept.x - twist_damping) * k.normal;
     }
     return result;
   }

@@ -13,6 +13,10 @@ namespace acopla::dem {
 /// is a pack. The normal points from j to i, so that a positive normal force pushes i along it. In contact: overlap > 0; a law is
 /// also called with overlap 0 for lanes that do not touch, and must stay finite there (its force is thrown away).
 ///
+/// Time. Particles move with their velocities of half steps, x_n − x_{n−1} = Δt v_{n−½}, so a spring of slip or of rolling that adds up
+/// Δt times the rates below follows the motion exactly. Dashpots want the rate at the whole step: closing_speed is extrapolated to it
+/// (3/2 v_{n−½} − 1/2 v_{n−3/2}), which keeps impacts of second order; slip and spins are those of the half step.
+///
 /// In three dimensions slip and spins are vectors. In two they have one component: slip along the tangent (−n_y, n_x), spins about
 /// the axis out of the plane. A law that is written with `+`, `−`, `dot` and `shortened` serves both.
 template <class Real_, int dimension_>
@@ -23,13 +27,13 @@ struct Kinematics {
   using Turn = Vector<Real, turns>;
 
   Real overlap;                      ///< r_i + r_j − d, or r − d at a wall [m], ≥ 0
-  Real closing_speed;                ///< > 0 while the bodies approach [m/s]
+  Real closing_speed;                ///< > 0 while the bodies approach, at the whole step [m/s]
   Real reduced_radius;               ///< 1 / (1/r_i + 1/r_j); r_i at a wall [m]
   Real reduced_mass;                 ///< 1 / (1/m_i + 1/m_j); m_i at a wall [kg]
   Vector<Real, dimension> normal;    ///< unit
-  Turn slip;                         ///< tangential velocity of i's surface over j's at the contact point [m/s]
-  Turn mean_spin;                    ///< (ω_i + ω_j) / 2: how the contact frame turns about its normal [rad/s]
-  Turn relative_spin;                ///< ω_i − ω_j [rad/s]
+  Turn slip;                         ///< tangential velocity of i's surface over j's at the contact point, at the half step [m/s]
+  Turn mean_spin;                    ///< (ω_i + ω_j) / 2: how the contact frame turns about its normal, half step [rad/s]
+  Turn relative_spin;                ///< ω_i − ω_j, half step [rad/s]
   Real reduced_inertia;              ///< 1 / (1/I_i + 1/I_j); I_i at a wall [kg m²]
   Real rolling_inertia;              ///< 1 / (1/(I_i + m_i r_i²) + 1/(I_j + m_j r_j²)) (Gomes 2014, eq. 2.103); I_i + m_i r_i² at a wall
   double step;                       ///< Δt [s]

@@ -7,8 +7,7 @@
 
 namespace acopla::dem {
 
-/// Linear tangential spring with Coulomb's slider; the dashpot acts only while it sticks (Gomes 2014, eq. 2.44–2.56). In increments of
-/// the trapezoidal rule, see Mindlin.
+/// Linear tangential spring with Coulomb's slider; the dashpot acts only while it sticks (Gomes 2014, eq. 2.44–2.56).
 struct LinearSlider {
   static constexpr const char* name = "linear_slider";
   static constexpr bool needs_moduli = false;
@@ -23,10 +22,10 @@ struct LinearSlider {
     return {inverse, 2 * pair.damping_ratio * std::sqrt(inverse), pair.friction};
   }
 
-  /// Elastic force on i half an increment ahead [N].
+  /// Elastic force on i [N].
   template <class K>
   struct History {
-    typename K::Turn ahead;
+    typename K::Turn force;
   };
   template <int>
   static constexpr std::array stored{Stored::force};
@@ -42,12 +41,10 @@ struct LinearSlider {
 
   template <class Normal, class K>
   static typename K::Turn force(const K& k, const typename K::Real& normal_force, const Parameters& p,
-                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& elastic) {
-    const auto half = (0.5 * k.step * stiffness<Normal>(k, p, normal)) * k.slip;
-    const auto trial = turned_with_frame(history.ahead, k) - half;
-    const auto result = held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
-    history.ahead = elastic - half;
-    return result;
+                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& before) {
+    before = turned_with_frame(history.force, k);
+    return held_by_friction(before - (k.step * stiffness<Normal>(k, p, normal)) * k.slip, p.friction * normal_force,
+                            dashpot<Normal>(k, p, normal), k.slip, history.force);
   }
 };
 

@@ -8,8 +8,7 @@
 namespace acopla::dem {
 
 /// Mindlin tangential contact in increments, with Coulomb's limit (Nasato 2011, eq. 7–9 as corrected: the printed secant
-/// law creates energy when the overlap changes; Thornton, Cummins & Cleary 2013). The increment is the trapezoidal rule over the
-/// step's two slips, of second order: with the slip at the step's end alone the spring would act as a dashpot of k Δt/2.
+/// law creates energy when the overlap changes; Thornton, Cummins & Cleary 2013).
 struct Mindlin {
   static constexpr const char* name = "mindlin";
   static constexpr bool needs_moduli = true;
@@ -24,10 +23,10 @@ struct Mindlin {
     return {pair.shear_modulus, std::sqrt(4 * pair.shear_modulus / pair.modulus), pair.hertz_damping, pair.friction};
   }
 
-  /// Elastic force on i half an increment ahead [N], and the stiffness of the last step [N/m].
+  /// Elastic force on i [N], and the stiffness of the last step [N/m].
   template <class K>
   struct History {
-    typename K::Turn ahead;
+    typename K::Turn force;
     typename K::Real stiffness;
   };
   template <int>
@@ -40,10 +39,12 @@ struct Mindlin {
     return 8 * p.shear_modulus * sqrt(k.reduced_radius * k.overlap);
   }
   /// Where the contact unloads, the spring of the lost area gives its force back: a spring that keeps its force while it softens creates
-  /// energy. @return S_t over that of the last step where it has fallen, else 1
+  /// energy. Where it loads, the increment is of the mean stiffness over the step: of second order.
   template <class K>
-  static typename K::Real softening(const typename K::Real& present, const History<K>& history) {
-    return select(present < history.stiffness, present / history.stiffness, typename K::Real(1));
+  static ShearSpring<typename K::Real> spring(const typename K::Real& present, const History<K>& history) {
+    using std::min;
+    using Real = typename K::Real;
+    return {present, select(present < history.stiffness, present / history.stiffness, Real(1)), 0.5 * (present + min(present, history.stiffness))};
   }
   template <class Normal, class K>
   static typename K::Real dashpot(const K& k, const Parameters& p, const typename Normal::Parameters& normal) {
@@ -51,18 +52,15 @@ struct Mindlin {
   }
 
   /// @param normal_force  [N]
-  /// @return tangential force on i [N]; its elastic part is left in `elastic`
+  /// @return tangential force on i [N]; `before` and history.force: its elastic part at the beginning and at the end of the step
   template <class Normal, class K>
   static typename K::Turn force(const K& k, const typename K::Real& normal_force, const Parameters& p,
-                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& elastic) {
-    using Real = typename K::Real;
-    const Real present = stiffness<Normal>(k, p, normal);
-    const auto half = (0.5 * k.step * present) * k.slip;
-    const auto trial = softening(present, history) * turned_with_frame(history.ahead, k) - half;
-    const auto result = held_by_friction(trial, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip, elastic);
-    history.ahead = elastic - half;
-    history.stiffness = present;
-    return result;
+                                const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& before) {
+    const auto now = spring(stiffness<Normal>(k, p, normal), history);
+    before = turned_with_frame(history.force, k);
+    history.stiffness = now.stiffness;
+    return held_by_friction(now.softening * before - (k.step * now.increment) * k.slip, p.friction * normal_force,
+                            dashpot<Normal>(k, p, normal), k.slip, history.force);
   }
 };
 

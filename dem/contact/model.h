@@ -17,16 +17,16 @@ template <class Real>
 struct ContactEnergy {
   Real normal = Real(0), tangential = Real(0), rolling = Real(0);  ///< stored in the springs now [J]
   Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant, by dashpot or plastic flow [W]
-  Real tangential_power = Real(0);    ///< taken from the bodies by tangential forces [W]
-  Real rolling_power = Real(0);       ///< taken from the bodies by rolling torques [W]
+  Real tangential_work = Real(0);     ///< taken from the bodies by tangential forces in the last step [J]
+  Real rolling_work = Real(0);        ///< taken from the bodies by rolling torques in the last step [J]
 
   void add(const ContactEnergy& other) {
     normal += other.normal;
     tangential += other.tangential;
     rolling += other.rolling;
     normal_dashpot += other.normal_dashpot;
-    tangential_power += other.tangential_power;
-    rolling_power += other.rolling_power;
+    tangential_work += other.tangential_work;
+    rolling_work += other.rolling_work;
   }
 };
 
@@ -51,13 +51,14 @@ struct ContactModel {
   /// What a contact carries from step to step. Where the laws store nothing, nothing is stored.
   template <class K>
   struct History {
+    typename K::Real closing_speed;  // of the last half step, to extrapolate from; 0 where the contact is new
     [[no_unique_address]] typename Normal::template History<K> normal;
     [[no_unique_address]] typename Tangential::template History<K> tangential;
     [[no_unique_address]] typename Rolling::template History<K> rolling;
   };
   template <class K>
   static constexpr std::size_t history_size() {
-    std::size_t size = 0;
+    std::size_t size = 1;
     const auto count = [&](Stored stored) { size += stored == Stored::scalar ? 1 : static_cast<std::size_t>(K::turns); };
     for (const auto stored : Normal::template stored<K::dimension>) count(stored);
     for (const auto stored : Tangential::template stored<K::dimension>) count(stored);
@@ -69,6 +70,7 @@ struct ContactModel {
   static constexpr auto swap_signs() {
     std::array<double, history_size<K>()> signs{};
     std::size_t at = 0;
+    signs[at++] = 1;  // closing_speed
     const auto add = [&](Stored stored) {
       const bool flips = stored == Stored::torque || (stored == Stored::force && K::dimension == 3);
       for (int n = 0; n < (stored == Stored::scalar ? 1 : K::turns); ++n) signs[at++] = flips ? -1.0 : 1.0;
@@ -98,25 +100,27 @@ struct ContactModel {
       const Real elastic = Normal::elastic_force(k, p.normal, history.normal);
       energy->normal_dashpot = select(touches, (response.normal - elastic) * k.closing_speed, Real(0));
     }
-    ShearSpring<Real> shear{Real(0), Real(1)};
+    ShearSpring<Real> shear{Real(0), Real(1), Real(0)};
     if constexpr (has_friction) {
-      typename K::Turn elastic;
-      shear.stiffness = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
-      if constexpr (requires { Tangential::softening(shear.stiffness, history.tangential); })
-        shear.softening = Tangential::softening(shear.stiffness, history.tangential);
-      response.shear = Tangential::template force<Normal>(k, response.normal, p.tangential, p.normal, history.tangential, elastic);
+      typename K::Turn before;
+      shear.stiffness = shear.increment = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
+      if constexpr (requires { Tangential::spring(shear.stiffness, history.tangential); })
+        shear = Tangential::spring(shear.stiffness, history.tangential);
+      response.shear = Tangential::template force<Normal>(k, response.normal, p.tangential, p.normal, history.tangential, before);
       if (energy) {
+        // The spring's mean over the step, and its dashpot: with x_n − x_{n−1} = Δt v_{n−½} the spring's part is exact.
+        const auto& elastic = history.tangential.force;
         energy->tangential = select(shear.stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear.stiffness), Real(0));
-        energy->tangential_power = -dot(response.shear, k.slip);
+        energy->tangential_work = -(Real(k.step) * dot(response.shear - elastic + Real(0.5) * (before + elastic), k.slip));
       }
     }
     if constexpr (has_rolling) {
-      Real stored;
-      response.torque = Rolling::torque(k, response.normal, shear, p.rolling, history.rolling, stored);
+      Real stored, work;
+      response.torque = Rolling::torque(k, response.normal, shear, p.rolling, history.rolling, stored, work);
       response.torque = select(touches, response.torque, zero_vector<Real, K::turns>());
       if (energy) {
         energy->rolling = stored;
-        energy->rolling_power = -dot(response.torque, k.relative_spin);
+        energy->rolling_work = work;
       }
     }
     return response;

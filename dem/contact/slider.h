@@ -9,6 +9,7 @@ template <class Real>
 struct ShearSpring {
   Real stiffness;  ///< k_t [N/m]; 0 without a tangential law
   Real softening;  ///< k_t over that of the last step where it has fallen, else 1
+  Real increment;  ///< k_t of this step's increment [N/m]
 };
 
 /// A spring that slides at a limit: what friction and rolling resistance have in common.

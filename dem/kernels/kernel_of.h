@@ -54,16 +54,16 @@ class KernelOf final : public Kernel {
   }
 
  private:
-  using Pack = Kinematics<Double4, dimension>;
+  using Pack = Kinematics<DoublePack, dimension>;
   using One = Kinematics<double, dimension>;
   using Turn = typename Pack::Turn;
   using History = typename Model::template History<Pack>;
   static constexpr std::size_t numbers = Model::template history_size<Pack>();
-  static_assert(numbers == 0 || sizeof(History) == numbers * sizeof(Double4), "a law's History holds what its `stored` lists");
+  static_assert(sizeof(History) == numbers * sizeof(DoublePack), "a law's History holds what its `stored` lists");
 
   // One body of a pack of contacts.
   struct Body {
-    Record4 position, velocity, spin;
+    RecordPack position, velocity, spin;
   };
 
   static Body body(const Particles& particles, const std::uint32_t* which) {
@@ -78,24 +78,24 @@ class KernelOf final : public Kernel {
     if constexpr (dimension == 2) return {b.velocity.z};
     else return {b.spin.x, b.spin.y, b.spin.z};
   }
-  static Vector<Double4, dimension> velocity_of(const Body& b) {
+  static Vector<DoublePack, dimension> velocity_of(const Body& b) {
     if constexpr (dimension == 2) return {b.velocity.x, b.velocity.y};
     else return {b.velocity.x, b.velocity.y, b.velocity.z};
   }
-  static Double4 inertia_of(const Body& b) {
+  static DoublePack inertia_of(const Body& b) {
     if constexpr (dimension == 2) return 0.5 * b.velocity.w * b.position.w * b.position.w;
     else return b.spin.w;
   }
 
   // Surface velocity across the normal: relative velocity of the centres, and ω × arm on both sides.
-  static Turn slip(const Vector<Double4, dimension>& relative, const Double4& along, const Turn& arms_times_spins, const Vector<Double4, dimension>& n) {
+  static Turn slip(const Vector<DoublePack, dimension>& relative, const DoublePack& along, const Turn& arms_times_spins, const Vector<DoublePack, dimension>& n) {
     if constexpr (dimension == 2) return {relative.y * n.x - relative.x * n.y - arms_times_spins.x};
     else return relative - along * n - cross(arms_times_spins, n);
   }
 
   // Normal and tangential force as one vector on i.
-  static Vector<Double4, dimension> force_of(const typename Model::template Response<Pack>& r, const Vector<Double4, dimension>& n) {
-    Vector<Double4, dimension> force = r.normal * n;
+  static Vector<DoublePack, dimension> force_of(const typename Model::template Response<Pack>& r, const Vector<DoublePack, dimension>& n) {
+    Vector<DoublePack, dimension> force = r.normal * n;
     if constexpr (Model::has_friction) {
       if constexpr (dimension == 2) force = {force.x - r.shear.x * n.y, force.y + r.shear.x * n.x};
       else force = force + r.shear;
@@ -103,71 +103,57 @@ class KernelOf final : public Kernel {
     return force;
   }
   // n × force: the torque of a unit arm along the normal.
-  static Turn turning_of(const typename Model::template Response<Pack>& r, const Vector<Double4, dimension>& n) {
-    if constexpr (!Model::has_friction) return zero_vector<Double4, Pack::turns>();
+  static Turn turning_of(const typename Model::template Response<Pack>& r, const Vector<DoublePack, dimension>& n) {
+    if constexpr (!Model::has_friction) return zero_vector<DoublePack, Pack::turns>();
     else if constexpr (dimension == 2) return r.shear;
     else return cross(n, r.shear);
   }
 
-  static void add_rows(Record* records, const std::uint32_t* which, std::size_t count, const Record4& rows) {
-    const Double4* row[] = {&rows.x, &rows.y, &rows.z, &rows.w};
-    for (std::size_t lane = 0; lane < count; ++lane) as_vector(records[which[lane]]) += row[lane]->v;
-  }
-  static void set_rows(Record* records, std::size_t count, const Record4& rows) {
-    const Double4* row[] = {&rows.x, &rows.y, &rows.z, &rows.w};
-    for (std::size_t lane = 0; lane < count; ++lane) as_vector(records[lane]) = row[lane]->v;
-  }
   // Force, and in the plane the torque beside it.
-  static Record4 force_rows(const Vector<Double4, dimension>& force, const Turn& torque) {
-    const Double4 none(0.0);
-    if constexpr (dimension == 2) return transposed(force.x.v, force.y.v, torque.x.v, none.v);
-    else return transposed(force.x.v, force.y.v, force.z.v, none.v);
+  static RecordPack with_torque(const Vector<DoublePack, dimension>& force, const Turn& torque) {
+    if constexpr (dimension == 2) return {force.x, force.y, torque.x, DoublePack(0.0)};
+    else return {force.x, force.y, force.z, DoublePack(0.0)};
   }
-  static Record4 torque_rows(const Turn& torque) {
-    const Double4 none(0.0);
-    if constexpr (dimension == 2) return transposed(none.v, none.v, torque.x.v, none.v);
-    else return transposed(torque.x.v, torque.y.v, torque.z.v, none.v);
+  static RecordPack record_of(const Turn& torque) {
+    if constexpr (dimension == 2) return {DoublePack(0.0), DoublePack(0.0), torque.x, DoublePack(0.0)};
+    else return {torque.x, torque.y, torque.z, DoublePack(0.0)};
   }
 
   // Histories of lanes that do not touch are forgotten.
   static void keep_while_touching(HistoryLane* stored, const Pack& k) {
-    if constexpr (numbers > 0) {
-      const auto touches = k.overlap > Double4(0.0);
-      for (std::size_t n = 0; n < numbers; ++n) store(stored[n].value, select(touches, load(stored[n].value), Double4(0.0)));
-    }
+    const auto touches = k.overlap > DoublePack(0.0);
+    for (std::size_t n = 0; n < numbers; ++n) store(stored[n].value, select(touches, load(stored[n].value), DoublePack(0.0)));
   }
 
-  static void add(ContactEnergy<double>& total, const ContactEnergy<Double4>& pack, const Double4& weight) {
+  static void add(ContactEnergy<double>& total, const ContactEnergy<DoublePack>& pack, const DoublePack& weight) {
     total.normal += sum(weight * pack.normal);
     total.tangential += sum(weight * pack.tangential);
     total.rolling += sum(weight * pack.rolling);
     total.normal_dashpot += sum(weight * pack.normal_dashpot);
-    total.tangential_power += sum(weight * pack.tangential_power);
-    total.rolling_power += sum(weight * pack.rolling_power);
+    total.tangential_work += sum(weight * pack.tangential_work);
+    total.rolling_work += sum(weight * pack.rolling_work);
   }
-  // 1 in the lanes that count.
-  static Double4 counting(std::size_t count) {
-    return Double4(Double4::Vector{1.0, count > 1 ? 1.0 : 0.0, count > 2 ? 1.0 : 0.0, count > 3 ? 1.0 : 0.0});
-  }
-
   template <bool ledger>
-  typename Model::template Response<Pack> answer(const Pack& k, HistoryLane* stored, const Double4& weight, ContactEnergy<double>* total) const {
-    History empty;
-    History& history = numbers > 0 ? *reinterpret_cast<History*>(stored) : empty;
+  typename Model::template Response<Pack> answer(Pack& k, HistoryLane* stored, const DoublePack& weight, ContactEnergy<double>* total) const {
+    History& history = *reinterpret_cast<History*>(stored);
+    const DoublePack half_step = k.closing_speed, before = history.closing_speed;
+    k.closing_speed = select(before == DoublePack(0.0), half_step, 1.5 * half_step - 0.5 * before);
+    history.closing_speed = half_step;
     typename Model::template Response<Pack> r;
     if constexpr (ledger) {
-      ContactEnergy<Double4> energy;
+      ContactEnergy<DoublePack> energy;
       r = Model::respond(k, parameters_, history, &energy);
       add(*total, energy, weight);
     } else {
-      r = Model::respond(k, parameters_, history, static_cast<ContactEnergy<Double4>*>(nullptr));
+      r = Model::respond(k, parameters_, history, static_cast<ContactEnergy<DoublePack>*>(nullptr));
     }
     keep_while_touching(stored, k);
     return r;
   }
 
+  // flatten: everything below is one loop body; a call in it would spill every register.
   template <bool ledger>
-  void all_pairs(PairContacts& contacts, Particles& particles, Exports& exports, double step, ContactEnergy<double>* energy) const {
+  [[gnu::flatten]] void all_pairs(PairContacts& contacts, Particles& particles, Exports& exports, double step, ContactEnergy<double>* energy) const {
     using std::max, std::sqrt;
     for (std::size_t c = 0; c < contacts.size; c += lanes) {
       const auto count = std::min(lanes, contacts.size - c);
@@ -175,30 +161,30 @@ class KernelOf final : public Kernel {
       const Body a = body(particles, i), b = body(particles, j);
       Pack k;
       k.step = step;
-      Vector<Double4, dimension> between;
+      Vector<DoublePack, dimension> between;
       if constexpr (dimension == 2) between = {a.position.x - b.position.x, a.position.y - b.position.y};
       else between = {a.position.x - b.position.x, a.position.y - b.position.y, a.position.z - b.position.z};
-      const Double4 distance = sqrt(dot(between, between));
-      const Double4 radii = a.position.w + b.position.w, masses = a.velocity.w + b.velocity.w;
+      const DoublePack distance = sqrt(dot(between, between));
+      const DoublePack radii = a.position.w + b.position.w, masses = a.velocity.w + b.velocity.w;
       // One division for three quotients: 1/d, r r/(r + r), m m/(m + m).
-      const Double4 sums = radii * masses, inverse = 1.0 / (distance * sums), inverse_sums = distance * inverse;
+      const DoublePack sums = radii * masses, inverse = 1.0 / (distance * sums), inverse_sums = distance * inverse;
       k.normal = (sums * inverse) * between;
-      k.overlap = max(Double4(0.0), radii - distance);
+      k.overlap = max(DoublePack(0.0), radii - distance);
       k.reduced_radius = a.position.w * b.position.w * masses * inverse_sums;
       k.reduced_mass = a.velocity.w * b.velocity.w * radii * inverse_sums;
       const auto relative = velocity_of(a) - velocity_of(b);
-      const Double4 along = dot(relative, k.normal);
+      const DoublePack along = dot(relative, k.normal);
       k.closing_speed = -along;
-      const Double4 arm_i = a.position.w - 0.5 * k.overlap, arm_j = b.position.w - 0.5 * k.overlap;  // both end at the contact point
+      const DoublePack arm_i = a.position.w - 0.5 * k.overlap, arm_j = b.position.w - 0.5 * k.overlap;  // both end at the contact point
       if constexpr (Model::rotates) {
         const Turn spin_i = spin_of(a), spin_j = spin_of(b);
         k.slip = slip(relative, along, arm_i * spin_i + arm_j * spin_j, k.normal);
-        k.mean_spin = Double4(0.5) * (spin_i + spin_j);
+        k.mean_spin = DoublePack(0.5) * (spin_i + spin_j);
         k.relative_spin = spin_i - spin_j;
         if constexpr (Model::has_rolling) set_inertias(k, a, b);
       }
-      HistoryLane* const stored = numbers > 0 ? &contacts.history[c / lanes * numbers] : nullptr;
-      const auto r = answer<ledger>(k, stored, ledger ? counting(count) : Double4(1.0), energy);
+      HistoryLane* const stored = &contacts.history[c / lanes * numbers];
+      const auto r = answer<ledger>(k, stored, ledger ? first_lanes(count) : DoublePack(1.0), energy);
       const auto force = force_of(r, k.normal);
       Turn on_i, on_j;
       if constexpr (Model::rotates) {
@@ -210,62 +196,62 @@ class KernelOf final : public Kernel {
           on_j = on_j - r.torque;
         }
       } else {
-        on_i = on_j = zero_vector<Double4, Pack::turns>();
+        on_i = on_j = zero_vector<DoublePack, Pack::turns>();
       }
-      add_rows(particles.force.data(), i, count, force_rows(force, on_i));
-      if (contacts.exports) set_rows(&exports.force[contacts.first_export + c], count, force_rows(-force, on_j));
-      else add_rows(particles.force.data(), j, count, force_rows(-force, on_j));
+      add_to(particles.force.data(), i, count, with_torque(force, on_i));
+      if (contacts.exports) write(&exports.force[contacts.first_export + c], count, with_torque(-force, on_j));
+      else add_to(particles.force.data(), j, count, with_torque(-force, on_j));
       if constexpr (dimension == 3 && Model::rotates) {
-        add_rows(particles.torque.data(), i, count, torque_rows(on_i));
-        if (contacts.exports) set_rows(&exports.torque[contacts.first_export + c], count, torque_rows(on_j));
-        else add_rows(particles.torque.data(), j, count, torque_rows(on_j));
+        add_to(particles.torque.data(), i, count, record_of(on_i));
+        if (contacts.exports) write(&exports.torque[contacts.first_export + c], count, record_of(on_j));
+        else add_to(particles.torque.data(), j, count, record_of(on_j));
       }
     }
   }
 
   static void set_inertias(Pack& k, const Body& a, const Body& b) {
-    const Double4 i = inertia_of(a), j = inertia_of(b);
+    const DoublePack i = inertia_of(a), j = inertia_of(b);
     k.reduced_inertia = i * j / (i + j);
-    const Double4 at_i = i + a.velocity.w * a.position.w * a.position.w, at_j = j + b.velocity.w * b.position.w * b.position.w;
+    const DoublePack at_i = i + a.velocity.w * a.position.w * a.position.w, at_j = j + b.velocity.w * b.position.w * b.position.w;
     k.rolling_inertia = at_i * at_j / (at_i + at_j);
   }
 
   template <bool ledger>
-  void all_walls(WallContacts& contacts, Particles& particles, double step, ContactEnergy<double>* energy) const {
+  [[gnu::flatten]] void all_walls(WallContacts& contacts, Particles& particles, double step, ContactEnergy<double>* energy) const {
     using std::max;
     for (std::size_t c = 0; c < contacts.size; c += lanes) {
       const auto count = std::min(lanes, contacts.size - c);
       const std::uint32_t* i = &contacts.particle[c];
       const Body a = body(particles, i);
-      const Record4 normal = loaded(&contacts.normal[c]), wall = loaded(&contacts.velocity[c]);
+      const RecordPack normal = loaded(&contacts.normal[c]), wall = loaded(&contacts.velocity[c]);
       Pack k;
       k.step = step;
-      Vector<Double4, dimension> relative;
+      Vector<DoublePack, dimension> relative;
       if constexpr (dimension == 2) {
         k.normal = {normal.x, normal.y};
-        relative = velocity_of(a) - Vector<Double4, 2>{wall.x, wall.y};
+        relative = velocity_of(a) - Vector<DoublePack, 2>{wall.x, wall.y};
       } else {
         k.normal = {normal.x, normal.y, normal.z};
-        relative = velocity_of(a) - Vector<Double4, 3>{wall.x, wall.y, wall.z};
+        relative = velocity_of(a) - Vector<DoublePack, 3>{wall.x, wall.y, wall.z};
       }
-      k.overlap = max(Double4(0.0), normal.w);
+      k.overlap = max(DoublePack(0.0), normal.w);
       k.reduced_radius = a.position.w;
       if (!contacts.curvature.empty()) k.reduced_radius = a.position.w / (1.0 + a.position.w * load(&contacts.curvature[c]));
       k.reduced_mass = a.velocity.w;
-      const Double4 along = dot(relative, k.normal);
+      const DoublePack along = dot(relative, k.normal);
       k.closing_speed = -along;
-      const Double4 arm = a.position.w - normal.w;  // to the contact point
+      const DoublePack arm = a.position.w - normal.w;  // to the contact point
       if constexpr (Model::rotates) {
         const Turn spin = spin_of(a);
         k.slip = slip(relative, along, arm * spin, k.normal);
-        k.mean_spin = Double4(0.5) * spin;
+        k.mean_spin = DoublePack(0.5) * spin;
         k.relative_spin = spin;
         if (!contacts.wall_spin.empty()) {
-          const Record4 turns = loaded(&contacts.wall_spin[c]);
+          const RecordPack turns = loaded(&contacts.wall_spin[c]);
           Turn wall_spin;
           if constexpr (dimension == 2) wall_spin = {turns.z};
           else wall_spin = {turns.x, turns.y, turns.z};
-          k.mean_spin = k.mean_spin + Double4(0.5) * wall_spin;
+          k.mean_spin = k.mean_spin + DoublePack(0.5) * wall_spin;
           k.relative_spin = k.relative_spin - wall_spin;
         }
         if constexpr (Model::has_rolling) {
@@ -273,19 +259,19 @@ class KernelOf final : public Kernel {
           k.rolling_inertia = k.reduced_inertia + a.velocity.w * a.position.w * a.position.w;
         }
       }
-      HistoryLane* const stored = numbers > 0 ? &contacts.history[c / lanes * numbers] : nullptr;
-      const auto r = answer<ledger>(k, stored, ledger ? wall.w * counting(count) : Double4(1.0), energy);
+      HistoryLane* const stored = &contacts.history[c / lanes * numbers];
+      const auto r = answer<ledger>(k, stored, ledger ? wall.w * first_lanes(count) : DoublePack(1.0), energy);
       const auto force = wall.w * force_of(r, k.normal);
-      Turn torque = zero_vector<Double4, Pack::turns>();
+      Turn torque = zero_vector<DoublePack, Pack::turns>();
       if constexpr (Model::rotates) torque = -((wall.w * arm) * turning_of(r, k.normal));
       if constexpr (Model::has_rolling) {
         const Turn rolling = wall.w * r.torque;
         torque = torque + rolling;
-        set_rows(&contacts.torque[c], count, torque_rows(rolling));
+        write(&contacts.torque[c], count, record_of(rolling));
       }
-      set_rows(&contacts.force[c], count, force_rows(force, zero_vector<Double4, Pack::turns>()));
-      add_rows(particles.force.data(), i, count, force_rows(force, torque));
-      if constexpr (dimension == 3 && Model::rotates) add_rows(particles.torque.data(), i, count, torque_rows(torque));
+      write(&contacts.force[c], count, with_torque(force, zero_vector<DoublePack, Pack::turns>()));
+      add_to(particles.force.data(), i, count, with_torque(force, torque));
+      if constexpr (dimension == 3 && Model::rotates) add_to(particles.torque.data(), i, count, record_of(torque));
     }
   }
 

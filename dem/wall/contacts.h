@@ -64,57 +64,58 @@ class WallContactList {
 
   template <class Archive>
   void state(Archive& archive) {
-    archive("first", first_);
     archive("near", near_);
     archive("start", start_);
     archive("elements", elements_);
-    std::size_t count = groups_.size();
-    archive("groups", count);
-    groups_.resize(count);
-    for (auto& group : groups_) group.state(archive);
+    archive("place", place_);
+    archive("materials", materials_);
+    archive("groups", groups_);
     archive("resultants", resultants_);
   }
 
  private:
-  // A particle over the inside of a plane or facet.
-  struct Lone {
-    Record plane;  // normal on the particle's side, now; w: normal · x on it
-    std::uint32_t particle, element;
-    double side;  // of a facet: +1 or −1
-  };
   struct Near {
     std::uint32_t particle, element;
   };
   // What a contact by the rules leaves for the next step and for the loads.
   struct Detail {
-    Vec3 point, normal;
-    double distance;
+    Record point, normal;
     std::array<double, 3> weights;
-    std::uint32_t element;
+    std::uint32_t element, near;  // near: place in near_
   };
-  // Contacts of one material with walls of one material: first the lone ones, then balls, then those by the rules, each ascending.
+  // Contacts of one material with walls of one material: first the lone ones, then balls, then those by the rules. Their keys, which
+  // say what is the same contact as in the last step, ascend: place in `lone`, then in `balls`, then in elements_.
   struct Group {
     std::uint8_t particle_material = 0, wall_material = 0;
-    std::uint32_t numbers = 0;  // a history has
-    std::uint8_t moves = 0, turns = 0, curved = 0;
-    std::vector<Lone> lone;
+    bool moves = false, turns = false, curved = false;  // some wall of its candidates
+    std::size_t numbers = 0;                            // a history has
+    std::vector<Near> lone;     // particles over the inside of a plane or facet
+    std::vector<Record> flats;  // of each: normal on the particle's side, and normal · x on it; in body axes
     std::vector<Near> balls;
-    std::uint32_t ruled = 0;  // candidates by the rules
+    std::size_t ruled = 0;  // candidates by the rules
     WallContacts contacts;
-    std::vector<std::uint32_t> key, key_before;        // candidate: lone, then ball, then place in elements_
-    std::vector<Detail> detail, detail_before;         // of contacts by the rules
-    std::uint32_t first_detail = 0, first_detail_before = 0;
-    std::size_t size_before = 0;
+    std::vector<std::uint32_t> key;
+    std::vector<Detail> detail;    // of contacts by the rules
+    std::size_t first_ruled = 0;   // contact
+    // Of the last step, while the present one is found.
+    std::vector<std::uint32_t> key_before;
+    std::vector<Detail> detail_before;
+    std::vector<HistoryLane> history_before;
+    std::size_t size_before = 0, first_ruled_before = 0;
+
+    std::size_t capacity() const { return lone.size() + balls.size() + ruled; }
+    std::uint32_t first_ruled_key() const { return static_cast<std::uint32_t>(lone.size() + balls.size()); }
 
     template <class Archive>
     void state(Archive& archive) {
       archive("particle_material", particle_material);
       archive("wall_material", wall_material);
-      archive("numbers", numbers);
       archive("moves", moves);
       archive("turns", turns);
       archive("curved", curved);
+      archive("numbers", numbers);
       archive("lone", lone);
+      archive("flats", flats);
       archive("balls", balls);
       archive("ruled", ruled);
       archive("particle", contacts.particle);
@@ -126,14 +127,43 @@ class WallContactList {
       archive("size", contacts.size);
       archive("key", key);
       archive("detail", detail);
-      archive("first_detail", first_detail);
+      archive("first_ruled", first_ruled);
+      key_before.resize(key.size());
+      detail_before.resize(detail.size());
+      history_before.resize(contacts.history.size());
     }
   };
 
-  std::uint32_t first_ = 0;
+  Group& group_of(const KernelTable& kernels, const WallSet& walls, std::uint8_t particle_material, std::uint8_t wall_material);
+  bool find_lone(const WallSet& walls, const Record& position, double travel, std::span<const std::uint32_t> elements);
+  static void sort_by_wall(const WallSet& walls, Group& group);
+  static void start_step(Group& group);
+  void touch_lone(Group& group, const WallSet& walls, const Particles& particles, double time);
+  void touch_balls(Group& group, const WallSet& walls, const Particles& particles, double time);
+  void touch_by_rules(const WallSet& walls, const Particles& particles, double time);
+  void add_by_rules(const WallSet& walls, std::uint8_t particle_material, std::uint32_t particle, std::uint32_t near, const NearestPoint& contact,
+                    double overlap, double weight);
+  void finish_step(Group& group, const WallSet& walls, const Particles& particles);
+  void move_histories(Group& group, const WallSet& walls, const Particles& particles);
+  void inherit(Group& group, const WallSet& walls, double radius, std::size_t first, std::size_t last, std::size_t first_before,
+               std::size_t last_before);
+  std::uint32_t element_of(const Group& group, std::size_t contact) const;
+  void load(const Group& group, bool rolls, const WallSet& walls, const Particles& particles, WallForces& forces);
+  static void spread(const Group& group, std::size_t contact, std::uint32_t element, const WallSet& walls, const Vec3& point, const Vec3& force,
+                     const Vec3& couple, WallForces& forces);
+
   std::vector<std::uint32_t> near_, start_, elements_;  // particles that need the rules, and elements of each (CSR)
+  std::vector<std::uint16_t> place_;                    // of groups, by materials
+  std::size_t materials_ = 0;
   std::vector<Group> groups_;
   std::vector<WallResultant> resultants_;
+
+  // Work space.
+  std::vector<std::uint32_t> found_elements_, flats_;
+  std::vector<NearestPoint> found_;
+  std::vector<double> weights_;
+  std::vector<std::size_t> origin_;
+  std::vector<bool> used_;
 };
 
 }  // namespace acopla::dem

@@ -22,6 +22,12 @@ struct WallResultant {
     power += other.power;
     return *this;
   }
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("force", force);
+    archive("torque", torque);
+    archive("power", power);
+  }
 };
 
 /// Forces on the walls summed over contacts and steps, of one partition.
@@ -30,6 +36,13 @@ struct WallForces {
   /// Only of the walls that are sent (WallSet::send), in the wall's body axes; see WallSet::sent_vertex and sent_facet.
   std::vector<Vec3> vertex;  ///< [N]
   std::vector<Vec3> couple;  ///< per facet: what its vertices must still receive as zero-sum forces [N m]
+
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("walls", walls);
+    archive("vertex", vertex);
+    archive("couple", couple);
+  }
 };
 
 /// What the walls received, as the mean over a window: Σ F Δt / window by the trapezoidal rule, which is exactly the momentum that the
@@ -65,12 +78,7 @@ class WallLoadSum {
 
   template <class Archive>
   void state(Archive& archive) {
-    // Between windows only the edge matters.
-    for (auto& forces : edge_) {
-      archive("walls", forces.walls);
-      archive("vertex", forces.vertex);
-      archive("couple", forces.couple);
-    }
+    archive("edge", edge_);  // between windows nothing else matters
   }
 
  private:

@@ -11,8 +11,8 @@ bool holds(const std::array<std::uint32_t, 3>& triangle, std::uint32_t vertex) {
 }
 
 bool holds_feature(const WallSet& walls, std::uint32_t element, const NearestPoint& contact) {
-  if (!walls.is_triangle(element)) return false;
-  const auto& triangle = walls.triangle(element);
+  if (!walls.is_facet(element)) return false;
+  const auto& triangle = walls.facet(element);
   for (std::uint8_t k = 0; k < contact.feature_size; ++k)
     if (!holds(triangle, contact.feature[k])) return false;
   return contact.feature_size > 0;

@@ -29,7 +29,7 @@ struct Wall {
   std::vector<Vec3> line;                             ///< corners of a line [m], z = 0
   bool closed = false;                                ///< the line's last corner joins its first
   double glued_diameter = 0;                          ///< [m]; 0: the facets themselves are touched
-  double glued_spacing = 0;                           ///< largest distance of neighbouring glued particles along a facet [m]; 0: the diameter
+  double glued_spacing = 0;                           ///< least distance of neighbouring glued particles along an edge [m]; 0: the diameter
   Motion motion;
 };
 
@@ -82,8 +82,8 @@ class WallSet {
   /// Box around all vertices and glued particles now; nothing where all walls are planes.
   std::optional<geometry::Box> bounds() const;
 
-  /// Elements within `reach` of a point, in ascending order, appended to `found`. Prescribed walls are looked for where they were at the
-  /// last mark() or prescribe().
+  /// Elements within `reach` of a point, in ascending order, appended to `found`. Prescribed walls are found where
+  /// they were at the last mark().
   void find_near(const Vec3& centre, double reach, std::vector<std::uint32_t>& found) const;
   /// True when the element is nearer than `radius`; then `nearest` is filled, in the world's axes.
   bool touches(std::uint32_t element, const Vec3& centre, double radius, NearestPoint& nearest) const;
@@ -91,7 +91,7 @@ class WallSet {
   // Motion.
 
   /// Some wall is not fixed.
-  bool move_at_all() const { return moving_; }
+  bool move_at_all() const { return !movers_.empty(); }
   /// Some wall of this material may turn or deform, so that contacts with it need its angular velocity.
   bool turn_at_all(std::uint8_t material) const;
   bool has_servos() const { return has_servos_; }
@@ -111,13 +111,14 @@ class WallSet {
   /// From body to world axes.
   const Eigen::Matrix3d& rotation(std::size_t wall) const { return frames_[wall].rotation; }
 
-  /// A list of contacts is made now. @param low, high  box that holds all particles [m]: how far a plane that turns can matter
+  /// Lists of contacts are made now.
+  /// @param low, high  box that holds all particles' centres [m]: how far a plane that turns can matter
   void mark(const Vec3& low, const Vec3& high);
-  /// Bound of how far any point of any wall (that particles in the marked box may touch) has moved since mark() [m].
+  /// Bound of how far any point of any wall that particles in the marked box may touch has moved since mark() [m].
   double travel_since_mark() const;
 
   /// What a coupled solver says at the start of a window: the surface is at x₀ + displacement and moves at `velocity` until the next call.
-  /// One vector a vertex of the wall, whose motion must be prescribed().
+  /// One vector a vertex of the wall, whose motion must be prescribed(). @param time  of the clock that move() gets
   void prescribe(std::size_t wall, std::span<const Vec3> displacements, std::span<const Vec3> velocities, double time);
 
   /// Forces of the present step, for servos: begin, then every partition's WallContactList::resultants().
@@ -142,31 +143,48 @@ class WallSet {
     archive("time", time_);
     archive("servos", servos_);
     archive("marks", marks_);
-    for (auto& motion : prescribed_) {
-      archive("position", motion.position);
-      archive("velocity", motion.velocity);
-      archive("marked", motion.marked);
-      archive("start", motion.start);
-      archive("fastest", motion.fastest);
-      archive("travel", motion.travel);
-      archive("travel_time", motion.travel_time);
-    }
-    restore();
+    archive("prescribed", prescribed_);
+    if constexpr (Archive::reading) restore();
   }
 
-  /// What lone particles over a facet or a plane need: see WallContactList.
-  struct Flat {
-    Vec3 normal;    ///< unit, body axes
-    double offset;  ///< normal · x on it [m]
-  };
-  Flat flat(std::uint32_t element) const;
+  // What the contact lists need to know of elements.
+
+  /// The vertices of this wall move against each other: its facets have no body of their own.
   bool deforms(std::size_t wall) const { return walls_[wall].motion.kind() == Motion::Kind::prescribed; }
-  Vec3 to_body(std::size_t wall, const Vec3& world) const;
-  Vec3 to_world(std::size_t wall, const Vec3& body) const;
-  /// Barycentric weights of the foot of `body` on a facet of a wall that does not deform; negative beyond an edge.
+  bool turns(std::size_t wall) const { return frames_[wall].turns; }
+  bool moves(std::size_t wall) const { return frames_[wall].moves; }
+  Vec3 to_body(std::size_t wall, const Vec3& world) const {
+    const auto& frame = frames_[wall];
+    if (!frame.moves) return world;
+    return frame.turns ? Vec3(frame.rotation.transpose() * (world - frame.shift)) : Vec3(world - frame.shift);
+  }
+  Vec3 to_world(std::size_t wall, const Vec3& body) const {
+    const auto& frame = frames_[wall];
+    if (!frame.moves) return body;
+    return frame.turns ? Vec3(frame.rotation * body + frame.shift) : Vec3(body + frame.shift);
+  }
+  /// A plane, or the plane of a facet of a wall that does not deform, in body axes: normal, and in w normal · x on it [m].
+  Record flat(std::uint32_t element) const;
+  /// The same in the world now.
+  Record to_world(std::size_t wall, const Record& flat) const;
+  /// Barycentric weights of the foot of a point in body axes on a facet of a wall that does not deform; negative beyond an edge.
   std::array<double, 3> foot_weights(std::uint32_t facet, const Vec3& body) const;
-  /// Distances of the foot from the facet's edges (edge k is opposite vertex k), negative outside [m].
-  std::array<double, 3> foot_margins(std::uint32_t facet, const Vec3& body) const;
+  /// How far a particle that touches a wall moves in the wall's body axes while travel_since_mark() grows by 1: on a mesh that turns it is
+  /// by its radius farther from the axis than the wall's own points.
+  double travel_ratio(std::size_t wall, double radius) const {
+    return frames_[wall].turns && !walls_[wall].is_plane ? 1 + radius / extent_[wall] : 1;
+  }
+  /// The foot of `centre` lies inside the facet, and does so wherever the centre moves by `travel`. Never for walls that deform.
+  bool holds_foot(std::uint32_t facet, const Vec3& centre, double travel) const;
+  /// The nearest point of `facet` lies on an edge or vertex that it shares with `other`, and does so wherever the centre moves by
+  /// `travel`: then keep_contacts() never keeps it beside a contact inside `other`.
+  bool yields_to(std::uint32_t facet, std::uint32_t other, const Vec3& centre, double travel) const;
+  struct BallNow {
+    Vec3 centre;
+    double radius;
+  };
+  BallNow ball(std::uint32_t element) const;
+  const std::array<double, 3>& ball_weights(std::uint32_t element) const { return balls_[ball_index(element)].weights; }
 
  private:
   // In body axes of a wall that does not deform. With y = x − centre: height = normal · y, weight_k = 1/size + gradient_k · y.
@@ -200,21 +218,42 @@ class WallSet {
   struct Mark {
     Vec3 displacement = Vec3::Zero();
     double angle = 0, reach = 0;  // reach: farthest point from the axis that matters [m]
+
+    template <class Archive>
+    void state(Archive& archive) {
+      archive("displacement", displacement);
+      archive("angle", angle);
+      archive("reach", reach);
+    }
   };
   struct Prescribed {
     std::vector<Vec3> position, velocity, marked;  // at `start`; at the last mark
     double start = 0, fastest = 0;                 // largest |velocity|
     double travel = 0, travel_time = 0;            // largest distance from `marked` at that time
+
+    template <class Archive>
+    void state(Archive& archive) {
+      archive("position", position);
+      archive("velocity", velocity);
+      archive("marked", marked);
+      archive("start", start);
+      archive("fastest", fastest);
+      archive("travel", travel);
+      archive("travel_time", travel_time);
+    }
   };
 
   std::size_t ball_index(std::uint32_t element) const { return element - facets_.size() - planes_.size(); }
   void add_facet(std::uint32_t wall, const std::array<std::uint32_t, 3>& vertices);
   void glue(std::uint32_t wall);
+  void add_ball(std::uint32_t wall, std::uint32_t facet, const std::array<double, 3>& weights);
+  void find_middle(std::size_t wall);
   void build_grid(std::size_t wall);
   void place(std::size_t wall, const Placement& placement);
   void restore();
-  Vec3 ball_centre(const Ball& ball) const;
   bool touches_facet(const Facet& facet, const Vec3& body, double radius, NearestPoint& nearest) const;
+  // Nearest point by regions, whatever the place; normal and distance too.
+  void find_nearest(const Facet& facet, const Vec3& body, NearestPoint& nearest) const;
 
   std::vector<Wall> walls_;
   std::vector<Vec3> vertices_;  // as the case gives them
@@ -233,7 +272,7 @@ class WallSet {
   std::vector<Vec3> middle_;            // of each wall in the case, see reference()
   std::vector<double> extent_;          // of each wall's points from its motion's axis
   double time_ = 0;
-  bool moving_ = false, has_servos_ = false;
+  bool has_servos_ = false;
   std::vector<std::uint8_t> sends_;
   std::vector<std::size_t> sent_vertex_, sent_facet_;
   std::size_t sent_vertices_ = 0, sent_facets_ = 0;

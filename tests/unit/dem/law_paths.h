@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -82,6 +83,7 @@ struct ClosedPath {
   double breathing = 0.7;                 ///< amplitude of the overlap over its mean
   double sliding = 6e-5;                  ///< amplitude of the tangential displacement [m]: beyond the friction of soft_glass()
   double rolling = 2e-3;                  ///< of the relative rotation [rad]: beyond its rolling friction
+  double entry = 0;                       ///< time from 0 on in which slip and rotation begin smoothly [s]
   Vec3 normal, across[2];
   Wave depth, displacement[2], rotation[3];
 
@@ -94,7 +96,7 @@ struct ClosedPath {
     across[1] = normal.cross(across[0]);
   }
 
-  /// The contact at time t [s], in steps of `step`.
+  /// The contact at time t [s], at the end of a step: slip and spin are what the step moved, over the step.
   K at(double t, double step) const {
     const double phase = t / period;
     K k{};
@@ -106,8 +108,14 @@ struct ClosedPath {
     k.reduced_mass = 0.005;
     k.reduced_inertia = 1e-7;
     k.rolling_inertia = 3e-7;
-    const double speed[] = {sliding * displacement[0].rate(phase) / period, sliding * displacement[1].rate(phase) / period};
-    const Vec3 spin = rolling / period * Vec3(rotation[0].rate(phase), rotation[1].rate(phase), rotation[2].rate(phase));
+    const double before = (t - step) / period;
+    const auto place = [&](const Wave& wave, double at) {
+      const double x = entry > 0 ? std::min(1.0, at * period / entry) : 1;
+      return x * x * (3 - 2 * x) * wave.at(at);
+    };
+    const auto moved = [&](const Wave& wave) { return (place(wave, phase) - place(wave, before)) / step; };
+    const double speed[] = {sliding * moved(displacement[0]), sliding * moved(displacement[1])};
+    const Vec3 spin = rolling * Vec3(moved(rotation[0]), moved(rotation[1]), moved(rotation[2]));
     if constexpr (dimension == 2) k.slip = {speed[0]};
     else k.slip = vector_of<3>(speed[0] * across[0] + speed[1] * across[1]);
     k.relative_spin = vector_of<K::turns>(spin);
