@@ -36,6 +36,12 @@ void Laws::load(const std::string& library) {
   libraries_.push_back(std::move(handle));
 }
 
+std::vector<LawSet> Laws::combinations() const {
+  std::vector<LawSet> all;
+  for (const auto& combination : combinations_) all.push_back(combination.laws);
+  return all;
+}
+
 std::vector<std::string> Laws::tangentials_of(const std::string& normal) const {
   std::vector<std::string> found;
   for (const auto& combination : combinations_)

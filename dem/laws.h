@@ -55,6 +55,8 @@ class Laws {
   std::vector<std::string> rollings() const { return names(rolling_); }
 
   bool has(const LawSet& laws) const { return combination(laws) != nullptr; }
+  /// Every combination that has a kernel.
+  std::vector<LawSet> combinations() const;
   /// Tangential laws that go with a normal law.
   std::vector<std::string> tangentials_of(const std::string& normal) const;
   bool rotates(const LawSet& laws) const;

@@ -4,6 +4,7 @@
 
 #include "dem/contact/kinematics.h"
 #include "dem/contact/pair_properties.h"
+#include "dem/contact/slider.h"
 
 namespace acopla::dem {
 
@@ -26,10 +27,10 @@ struct ConstantTorque {
   /// of 2 (I*/I) cap stays below 2, so the cap takes an eighth of the spin a step.
   static constexpr double share = 0.125;
 
-  /// @param shear_stiffness  the tangential law's k_t [N/m]; unused here
+  /// @param normal_force  [N]
   /// @return torque on i [N m]; −torque acts on j. `energy`: what a spring stores [J]; `work`: what was taken in the step [J]
   template <class K>
-  static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const typename K::Real&, const Parameters& p,
+  static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const ShearSpring<typename K::Real>&, const Parameters& p,
                                  History<K>&, typename K::Real& energy, typename K::Real& work) {
     using std::min, std::sqrt;
     using Real = typename K::Real;

@@ -56,13 +56,15 @@ struct ElasticPlastic {
     return p.damping * sqrt(k.rolling_inertia * stiffness(k, shear_stiffness, p));
   }
 
-  /// @param shear_stiffness  the tangential law's k_t [N/m]
+  /// @param shear  the tangential law's spring. Where it softens, those of rolling and twisting do, and give that share of their torque
+  /// back (see Mindlin::spring)
   /// @return torque on i [N m]; −torque acts on j. `energy`: what the springs store [J]; `work`: what they took in the step [J]
   template <class K>
-  static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const typename K::Real& shear_stiffness,
+  static typename K::Turn torque(const K& k, const typename K::Real& normal_force, const ShearSpring<typename K::Real>& shear,
                                  const Parameters& p, History<K>& history, typename K::Real& energy, typename K::Real& work) {
     using Real = typename K::Real;
-    const Real spring = stiffness(k, shear_stiffness, p), dash = dashpot(k, shear_stiffness, p);
+    const Real spring = stiffness(k, shear.stiffness, p), dash = dashpot(k, shear.stiffness, p);
+    const Real increment = k.step * stiffness(k, shear.increment, p);
     const Real limit = p.friction * k.reduced_radius * normal_force;
     typename K::Turn turn = k.relative_spin;
     Real twist(0);
@@ -71,7 +73,7 @@ struct ElasticPlastic {
       turn = turn - twist * k.normal;
     }
     const auto before = turned_with_frame(history.torque, k);
-    const auto yields = slides_at(before - (k.step * spring) * turn, limit, history.torque);
+    const auto yields = slides_at(shear.softening * before - increment * turn, limit, history.torque);
     const typename K::Turn damping = select(yields, Real(0), dash) * turn;
     energy = select(spring > Real(0), dot(history.torque, history.torque) / (2.0 * spring), Real(0));
     work = k.step * dot(damping - Real(0.5) * (before + history.torque), turn);
@@ -79,7 +81,7 @@ struct ElasticPlastic {
     if constexpr (K::dimension == 3) {
       const Real twisting = p.twisting * spring, held = history.twist;
       Vector<Real, 1> kept;
-      const auto twists = slides_at(Vector<Real, 1>{held - k.step * twisting * twist}, p.twisting * limit, kept);
+      const auto twists = slides_at(Vector<Real, 1>{shear.softening * held - p.twisting * increment * twist}, p.twisting * limit, kept);
       const Real twist_damping = select(twists, Real(0), p.twisting * dash) * twist;
       history.twist = kept.x;
       energy = energy + select(twisting > Real(0), kept.x * kept.x / (2.0 * twisting), Real(0));

@@ -17,6 +17,10 @@ struct Hertz {
     double damping;  ///< 2 sqrt(5/6) β; from the restitution (dem/contact/restitution.h)
   };
   static Parameters from(const PairProperties& pair) { return {pair.modulus, pair.hertz_damping}; }
+  template <class K>
+  struct History {};
+  template <int>
+  static constexpr std::array<Stored, 0> stored{};
 
   /// S_n = 2 Y* sqrt(R* δ) [N/m], eq. 5
   template <class K>
@@ -36,19 +40,19 @@ struct Hertz {
     return p.damping * impedance(k, p);
   }
   template <class K>
-  static typename K::Real elastic_force(const K& k, const Parameters& p) {
+  static typename K::Real elastic_force(const K& k, const Parameters& p, const History<K>&) {
     return 2.0 / 3.0 * stiffness(k, p) * k.overlap;
   }
   /// ∫ F dδ = 2/5 F δ [J]
   template <class K>
-  static typename K::Real energy(const K& k, const Parameters& p) {
-    return 0.4 * elastic_force(k, p) * k.overlap;
+  static typename K::Real energy(const K& k, const Parameters& p, const History<K>& history) {
+    return 0.4 * elastic_force(k, p, history) * k.overlap;
   }
   /// @return normal force [N], ≥ 0
   template <class K>
-  static typename K::Real force(const K& k, const Parameters& p) {
+  static typename K::Real force(const K& k, const Parameters& p, History<K>& history) {
     using std::max;
-    return max(typename K::Real(0), elastic_force(k, p) + dashpot(k, p) * k.closing_speed);
+    return max(typename K::Real(0), elastic_force(k, p, history) + dashpot(k, p) * k.closing_speed);
   }
 };
 

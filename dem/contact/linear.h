@@ -23,6 +23,10 @@ struct Linear {
     double damping_ratio;  ///< c / (2 sqrt(k m*)); from the restitution (dem/contact/restitution.h)
   };
   static Parameters from(const PairProperties& pair) { return {pair.stiffness, pair.damping_ratio}; }
+  template <class K>
+  struct History {};
+  template <int>
+  static constexpr std::array<Stored, 0> stored{};
 
   template <class K>
   static typename K::Real stiffness(const K&, const Parameters& p) {
@@ -38,18 +42,18 @@ struct Linear {
     return 2 * p.damping_ratio * impedance(k, p);
   }
   template <class K>
-  static typename K::Real elastic_force(const K& k, const Parameters& p) {
+  static typename K::Real elastic_force(const K& k, const Parameters& p, const History<K>&) {
     return p.stiffness * k.overlap;
   }
   template <class K>
-  static typename K::Real energy(const K& k, const Parameters& p) {
+  static typename K::Real energy(const K& k, const Parameters& p, const History<K>&) {
     return 0.5 * p.stiffness * k.overlap * k.overlap;
   }
   /// @return normal force [N], ≥ 0
   template <class K>
-  static typename K::Real force(const K& k, const Parameters& p) {
+  static typename K::Real force(const K& k, const Parameters& p, History<K>& history) {
     using std::max;
-    return max(typename K::Real(0), elastic_force(k, p) + dashpot(k, p) * k.closing_speed);
+    return max(typename K::Real(0), elastic_force(k, p, history) + dashpot(k, p) * k.closing_speed);
   }
 };
 

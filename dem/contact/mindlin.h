@@ -38,6 +38,14 @@ struct Mindlin {
     using std::sqrt;
     return 8 * p.shear_modulus * sqrt(k.reduced_radius * k.overlap);
   }
+  /// Where the contact unloads, the spring of the lost area gives its force back: a spring that keeps its force while it softens creates
+  /// energy. Where it loads, the increment is of the mean stiffness over the step: of second order.
+  template <class K>
+  static ShearSpring<typename K::Real> spring(const typename K::Real& present, const History<K>& history) {
+    using std::min;
+    using Real = typename K::Real;
+    return {present, select(present < history.stiffness, present / history.stiffness, Real(1)), 0.5 * (present + min(present, history.stiffness))};
+  }
   template <class Normal, class K>
   static typename K::Real dashpot(const K& k, const Parameters& p, const typename Normal::Parameters& normal) {
     return p.damping * p.impedance * Normal::impedance(k, normal);
@@ -48,14 +56,11 @@ struct Mindlin {
   template <class Normal, class K>
   static typename K::Turn force(const K& k, const typename K::Real& normal_force, const Parameters& p,
                                 const typename Normal::Parameters& normal, History<K>& history, typename K::Turn& before) {
-    using Real = typename K::Real;
-    const Real present = stiffness<Normal>(k, p, normal);
-    // Where the contact unloads, the spring of the lost area gives its force back; without this, energy is created.
-    const Real kept = select(present < history.stiffness, present / history.stiffness, Real(1));
+    const auto now = spring(stiffness<Normal>(k, p, normal), history);
     before = turned_with_frame(history.force, k);
-    history.stiffness = present;
-    return held_by_friction(kept * before - (k.step * present) * k.slip, p.friction * normal_force, dashpot<Normal>(k, p, normal), k.slip,
-                            history.force);
+    history.stiffness = now.stiffness;
+    return held_by_friction(now.softening * before - (k.step * now.increment) * k.slip, p.friction * normal_force,
+                            dashpot<Normal>(k, p, normal), k.slip, history.force);
   }
 };
 

@@ -16,7 +16,7 @@ namespace acopla::dem {
 template <class Real>
 struct ContactEnergy {
   Real normal = Real(0), tangential = Real(0), rolling = Real(0);  ///< stored in the springs now [J]
-  Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant [W]
+  Real normal_dashpot = Real(0);      ///< lost in the normal direction this instant, by dashpot or plastic flow [W]
   Real tangential_work = Real(0);     ///< taken from the bodies by tangential forces in the last step [J]
   Real rolling_work = Real(0);        ///< taken from the bodies by rolling torques in the last step [J]
 
@@ -52,6 +52,7 @@ struct ContactModel {
   template <class K>
   struct History {
     typename K::Real closing_speed;  // of the last half step, to extrapolate from; 0 where the contact is new
+    [[no_unique_address]] typename Normal::template History<K> normal;
     [[no_unique_address]] typename Tangential::template History<K> tangential;
     [[no_unique_address]] typename Rolling::template History<K> rolling;
   };
@@ -59,6 +60,7 @@ struct ContactModel {
   static constexpr std::size_t history_size() {
     std::size_t size = 1;
     const auto count = [&](Stored stored) { size += stored == Stored::scalar ? 1 : static_cast<std::size_t>(K::turns); };
+    for (const auto stored : Normal::template stored<K::dimension>) count(stored);
     for (const auto stored : Tangential::template stored<K::dimension>) count(stored);
     for (const auto stored : Rolling::template stored<K::dimension>) count(stored);
     return size;
@@ -73,6 +75,7 @@ struct ContactModel {
       const bool flips = stored == Stored::torque || (stored == Stored::force && K::dimension == 3);
       for (int n = 0; n < (stored == Stored::scalar ? 1 : K::turns); ++n) signs[at++] = flips ? -1.0 : 1.0;
     };
+    for (const auto stored : Normal::template stored<K::dimension>) add(stored);
     for (const auto stored : Tangential::template stored<K::dimension>) add(stored);
     for (const auto stored : Rolling::template stored<K::dimension>) add(stored);
     return signs;
@@ -91,26 +94,29 @@ struct ContactModel {
     using Real = typename K::Real;
     const auto touches = k.overlap > Real(0);
     Response<K> response;
-    response.normal = select(touches, Normal::force(k, p.normal), Real(0));
+    response.normal = select(touches, Normal::force(k, p.normal, history.normal), Real(0));
     if (energy) {
-      energy->normal = Normal::energy(k, p.normal);
-      energy->normal_dashpot = select(touches, (response.normal - Normal::elastic_force(k, p.normal)) * k.closing_speed, Real(0));
+      energy->normal = Normal::energy(k, p.normal, history.normal);
+      const Real elastic = Normal::elastic_force(k, p.normal, history.normal);
+      energy->normal_dashpot = select(touches, (response.normal - elastic) * k.closing_speed, Real(0));
     }
-    Real shear_stiffness(0);
+    ShearSpring<Real> shear{Real(0), Real(1), Real(0)};
     if constexpr (has_friction) {
       typename K::Turn before;
-      shear_stiffness = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
+      shear.stiffness = shear.increment = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);
+      if constexpr (requires { Tangential::spring(shear.stiffness, history.tangential); })
+        shear = Tangential::spring(shear.stiffness, history.tangential);
       response.shear = Tangential::template force<Normal>(k, response.normal, p.tangential, p.normal, history.tangential, before);
       if (energy) {
         // The spring's mean over the step, and its dashpot: with x_n − x_{n−1} = Δt v_{n−½} the spring's part is exact.
         const auto& elastic = history.tangential.force;
-        energy->tangential = select(shear_stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear_stiffness), Real(0));
+        energy->tangential = select(shear.stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear.stiffness), Real(0));
         energy->tangential_work = -(Real(k.step) * dot(response.shear - elastic + Real(0.5) * (before + elastic), k.slip));
       }
     }
     if constexpr (has_rolling) {
       Real stored, work;
-      response.torque = Rolling::torque(k, response.normal, shear_stiffness, p.rolling, history.rolling, stored, work);
+      response.torque = Rolling::torque(k, response.normal, shear, p.rolling, history.rolling, stored, work);
       response.torque = select(touches, response.torque, zero_vector<Real, K::turns>());
       if (energy) {
         energy->rolling = stored;

@@ -4,6 +4,14 @@
 
 namespace acopla::dem {
 
+/// The tangential law's spring, on which a rolling law may build its own.
+template <class Real>
+struct ShearSpring {
+  Real stiffness;  ///< k_t [N/m]; 0 without a tangential law
+  Real softening;  ///< k_t over that of the last step where it has fallen, else 1
+  Real increment;  ///< k_t of this step's increment [N/m]
+};
+
 /// A spring that slides at a limit: what friction and rolling resistance have in common.
 /// @param trial    the spring's force had it not slid
 /// @param elastic  out: what the spring keeps: `trial`, or as much of it as the limit allows

@@ -38,7 +38,8 @@ class KernelOf final : public Kernel {
     k.reduced_mass = reduced_mass;
     k.rolling_inertia = rolling_inertia;
     ContactStiffness result;
-    result.normal = Model::Normal::stiffness(k, parameters_.normal);
+    if constexpr (requires { Model::Normal::steepest(k, parameters_.normal); }) result.normal = Model::Normal::steepest(k, parameters_.normal);
+    else result.normal = Model::Normal::stiffness(k, parameters_.normal);
     if constexpr (requires { Model::Normal::dashpot(k, parameters_.normal); }) result.normal_dashpot = Model::Normal::dashpot(k, parameters_.normal);
     if constexpr (Model::has_friction) {
       result.shear = Model::Tangential::template stiffness<typename Model::Normal>(k, parameters_.tangential, parameters_.normal);
