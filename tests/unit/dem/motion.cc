@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include "dem/insertion.h"
-#include "dem/neighbours.h"
 #include "scenes.h"
 
 namespace acopla::dem::test {
@@ -238,26 +237,6 @@ TEST(Cloud, WallImpulseIsTheMomentumTheParticlesLost) {
     for (const auto& force : load.vertex_force) sum += force;
     EXPECT_LT((sum - load.wall_force[0]).norm(), 1e-12 * load.wall_force[0].norm() + 1e-15);
   }
-}
-
-TEST(NeighbourList, FindsEveryPairOnce) {
-  Random random(3);
-  std::vector<Record> positions;
-  for (int k = 0; k < 2000; ++k)
-    positions.push_back({random.uniform(), random.uniform(), 0.3 * random.uniform(), 0.01 + 0.02 * random.uniform()});
-  CellGrid grid;
-  grid.build(positions, 0.07);
-  PairList pairs;
-  grid.find_pairs(positions, 0.01, pairs);
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> found, expected;
-  for (std::uint32_t i = 0; i < positions.size(); ++i) {
-    for (auto k = pairs.start[i]; k < pairs.start[i + 1]; ++k) found.emplace_back(std::min(i, pairs.second[k]), std::max(i, pairs.second[k]));
-    for (std::uint32_t j = i + 1; j < positions.size(); ++j)
-      if ((positions[i].vector() - positions[j].vector()).norm() < positions[i].w + positions[j].w + 0.01) expected.emplace_back(i, j);
-  }
-  std::sort(found.begin(), found.end());
-  std::sort(expected.begin(), expected.end());
-  EXPECT_EQ(found, expected);
 }
 
 TEST(RunningAway, ParticleThatLeavesIsNamed) {
