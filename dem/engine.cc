@@ -16,6 +16,7 @@ namespace {
 // One kernel for every pair of materials that can meet, and nothing for the others.
 KernelTable make_kernels(const Scene& scene) {
   KernelTable table;
+  table.laws = scene.laws;
   table.materials = scene.materials.size();
   table.group.assign(table.materials * table.materials, 0);
   table.kernel.push_back(nullptr);
@@ -39,6 +40,7 @@ Engine::Engine(const Scene& scene, Particles particles, WallSet walls)
     : gravity_(scene.gravity), damping_(scene.damping), kernels_(make_kernels(scene)), particles_(std::move(particles)), walls_(std::move(walls)),
       keeps_ledger_(scene.keeps_ledger), allow_unstable_(scene.allow_unstable_step), drift_limit_(scene.drift_limit),
       partitions_(std::max(1u, scene.partitions)), team_(std::max(1u, scene.threads)) {
+  for (const auto& material : scene.materials) densities_.push_back(material.density);
   set_sizes();
   set_domain(scene);
   loads_ = WallLoadSum(walls_, partitions_.size());
@@ -219,7 +221,7 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
   saved_pairs_.settle(place_, kernels_, particles_.size());
   const auto count = static_cast<std::uint32_t>(particles_.size());
   const auto parts = static_cast<std::uint32_t>(partitions_.size());
-  walls_.mark(domain_.low, domain_.high, largest_);
+  walls_.mark(domain_.low, domain_.high);
   team_.run(parts, [&](unsigned p) {
     auto& partition = partitions_[p];
     partition.first = static_cast<std::uint32_t>(std::uint64_t{count} * p / parts);
@@ -279,7 +281,7 @@ void Engine::sort_particles(const std::vector<std::uint32_t>& order) {
 void Engine::insert(const std::vector<NewParticle>& particles) {
   if (particles.empty()) return;
   const double before = keeps_ledger_ ? kinetic_energy() + potential_energy() : 0;
-  for (const auto& p : particles) particles_.add(p.at, p.radius, p.density, p.material, p.velocity, p.spin);
+  for (const auto& p : particles) particles_.add(p.at, p.radius, densities_[p.material], p.material, p.velocity, p.spin);
   if (keeps_ledger_) ledger_.add(kinetic_energy() + potential_energy() - before);
   set_sizes();
   outdated_ = true;

@@ -151,6 +151,7 @@ class Engine {
   Vec3 gravity_;
   Damping damping_;
   KernelTable kernels_;
+  std::vector<double> densities_;  // by material
   Particles particles_;
   WallSet walls_;
   geometry::Box domain_;

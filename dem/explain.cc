@@ -14,27 +14,37 @@
 namespace acopla::dem {
 namespace {
 
-// Seconds a particle-step of this scene's kernel, measured on what the settled scene will look like: a cubic lattice of
-// touching spheres that fills the first region from its lower corner against gravity, between the scene's own walls.
-double measure_particle_step(const Scene& scene, double step) {
-  const auto& first = scene.insertions.front();
-  const double spacing = 2 * first.radius * (1 - 1e-4);
-  Eigen::Index up = 2;
+// Seconds a particle-step of this scene's kernel, measured on what the settled scene will look like: a lattice of touching particles of
+// the first filling's mean size, from the lower corner of the walls and regions against gravity, between the scene's own walls.
+double measure_particle_step(const Scene& scene, double step, std::size_t expected) {
+  const bool plane = scene.dimension == 2;
+  const auto material = scene.particle_materials().front();
+  const double radius = std::sqrt(scene.smallest_radius(material) * scene.largest_radius());
+  const double spacing = 2 * radius * (1 - 1e-4);
+  const auto regions = scene.regions();
+  Vec3 low = Vec3::Zero(), high = Vec3::Constant(40 * radius);
+  if (!regions.empty()) {
+    low = regions.front().low;
+    high = regions.front().high;
+  }
+  Eigen::Index up = plane ? 1 : 2;
   if (!scene.gravity.isZero(0)) scene.gravity.cwiseAbs().maxCoeff(&up);
   const bool falls_up = scene.gravity[up] > 0;
-  const auto along = [&](Eigen::Index d) { return std::max(1, static_cast<int>((first.high[d] - first.low[d]) / spacing)); };
-  const Eigen::Index side = (up + 1) % 3, other = (up + 2) % 3;
+  const auto along = [&](Eigen::Index d) {
+    return plane && d == 2 ? 1 : std::max(1, static_cast<int>((high[d] - low[d]) / spacing));
+  };
+  const Eigen::Index side = plane ? 1 - up : (up + 1) % 3, other = plane ? 2 : (up + 2) % 3;
   Particles particles;
   particles.kind = scene.kind();
-  const auto count = std::min<std::size_t>(20000, scene.particle_count());
+  const auto count = std::clamp<std::size_t>(expected, 1, 20000);
   for (int layer = 0; particles.size() < count; ++layer)
     for (int j = 0; j < along(other) && particles.size() < count; ++j)
       for (int i = 0; i < along(side) && particles.size() < count; ++i) {
         Vec3 at;
-        at[side] = first.low[side] + (i + 0.5) * spacing;
-        at[other] = first.low[other] + (j + 0.5) * spacing;
-        at[up] = falls_up ? first.high[up] - (layer + 0.5) * spacing : first.low[up] + (layer + 0.5) * spacing;
-        particles.add(at, first.radius, scene.materials[first.material].density, first.material, Vec3::Zero());
+        at[side] = low[side] + (i + 0.5) * spacing;
+        at[other] = plane ? 0 : low[other] + (j + 0.5) * spacing;
+        at[up] = falls_up ? high[up] - (layer + 0.5) * spacing : low[up] + (layer + 0.5) * spacing;
+        particles.add(at, radius, scene.materials[material].density, material, Vec3::Zero());
       }
   const auto engine = make_engine(scene, std::move(particles));
   engine->advance(2, step * 1e-3);  // so short that nothing moves
@@ -83,7 +93,7 @@ std::string explain(const io::Table& root, const std::string& name) {
   Particles none;
   none.kind = scene.kind();
   const auto costs = make_engine(scene, none)->costs();
-  const double seconds = measure_particle_step(scene, step) * count * steps;
+  const double seconds = measure_particle_step(scene, step, scene.particle_count()) * count * steps;
 
   std::string text;
   const auto line = [&](const char* what, const std::string& value) { text += fmt::format("  {:22} {}\n", what, value); };
@@ -102,8 +112,8 @@ std::string explain(const io::Table& root, const std::string& name) {
       const bool hertz = pair.laws.normal == "hertz";
       const auto& shape = hertz ? hertz_impact : linear_impact;
       const double alpha = hertz ? pair.hertz_damping * std::sqrt(1.5) : 2 * pair.damping_ratio;
-      // A gentle impact: 1 m/s between spheres of the first insertion, in units of that impact.
-      const double radius = scene.insertions.front().radius / 2;
+      // A gentle impact: 1 m/s between spheres of the smallest size, in units of that impact.
+      const double radius = scene.smallest_radius(i) / 2;
       const double mass = scene.materials[i].density * volume_of(scene.dimension, 2 * radius) / 2;
       const double unit = hertz ? std::pow(mass / (4.0 / 3.0 * pair.modulus * std::sqrt(radius)), 0.4) : std::sqrt(mass / pair.stiffness);
       const double got = integrated_restitution(shape, alpha, step / unit);

@@ -27,6 +27,17 @@ struct PairContacts {
   /// Where j is another thread's particle: the force on it goes to exports[first_export + pair], not to the particle.
   bool exports = false;
   std::size_t first_export = 0;
+
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("i", i);
+    archive("j", j);
+    archive("slot", slot);
+    archive("history", history);
+    archive("size", size);
+    archive("exports", exports);
+    archive("first_export", first_export);
+  }
 };
 
 /// Contacts of one partition's particles of one material with walls of one material. Filled by

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
-#ifdef __AVX512VL__
+#ifdef __AVX2__
 #include <immintrin.h>
 #endif
 
@@ -62,43 +63,81 @@ void sort_by_key(std::vector<Keyed>& items, std::vector<Keyed>& scratch) {
 
 // --- building
 
+namespace {
+
+// ⌈log2 x⌉ of a positive number.
+int rounded_up_log2(double x) { return static_cast<int>((std::bit_cast<std::uint64_t>(x) - 1) >> 52) - 1022; }
+
+}  // namespace
+
+// The cells of the levels double; where the sequence begins is free. It begins where the particles, each weighted with the volume
+// of its cell over the cube of its reach, cost the least.
 void HierarchicalGrid::choose_levels(std::span<const Record> positions, double smallest, double largest) {
   const double least = 2 * smallest + skin_, most = 2 * largest + skin_;
   edge_ = most;
   level_count_ = 1;
-  if (most <= 2 * least || least <= 0) return;
-  // The cells of the levels double, but where the sequence begins is free: where the particles, each weighted with the volume
-  // of its cells over the cube of its reach, cost the least.
-  constexpr int steps = 16;  // an octave
-  std::vector<std::size_t> histogram;
-  for (const auto& p : positions) {
-    const auto bin = static_cast<std::size_t>(std::ceil(steps * std::log2((2 * p.w + skin_) / least) - 1e-9));
-    if (bin >= histogram.size()) histogram.resize(bin + 1, 0);
-    ++histogram[bin];
-  }
+  if (most <= 2 * least || least <= 0 || most / least > 0x1p200) return;
+  // Sixteen bins an octave: the upper bits of a double.
+  constexpr int dropped = 52 - 4, begins = 16;
+  constexpr auto one = std::bit_cast<std::uint64_t>(1.0) >> dropped;
+  const auto bin_of = [&](double reach) { return (std::bit_cast<std::uint64_t>(std::max(1.0, reach / least)) >> dropped) - one; };
+  std::vector<std::size_t> histogram(bin_of(most) + 1, 0);
+  for (const auto& p : positions) ++histogram[bin_of(2 * p.w + skin_)];
   double cheapest = std::numeric_limits<double>::infinity();
-  int best = 0;
-  for (int begin = 0; begin < steps; ++begin) {
+  for (int k = 0; k < begins; ++k) {
+    const double edge = least * (1 + k / static_cast<double>(begins)) * (1 + 1e-12);
     double cost = 0;
     for (std::size_t b = 0; b < histogram.size(); ++b) {
-      const int above = static_cast<int>(b) - begin;
-      const int gap = above <= 0 ? -above : (steps - above % steps) % steps;
-      cost += static_cast<double>(histogram[b]) * std::exp2(3.0 * gap / steps);
+      if (!histogram[b]) continue;
+      const double reach = least * std::bit_cast<double>((one + b) << dropped);
+      const double cell = std::ldexp(edge, std::max(0, rounded_up_log2(reach / edge)));
+      cost += static_cast<double>(histogram[b]) * std::pow(cell / reach, 3);
     }
-    if (cost < cheapest) {
-      cheapest = cost;
-      best = begin;
-    }
+    if (cost >= cheapest) continue;
+    cheapest = cost;
+    edge_ = edge;
   }
-  edge_ = least * std::exp2(static_cast<double>(best) / steps) * (1 + 1e-9);
-  level_count_ = 1 + static_cast<std::size_t>(std::max(0.0, std::ceil(std::log2(most / edge_))));
+  level_count_ = 1 + static_cast<std::size_t>(std::max(0, rounded_up_log2(most / edge_)));
 }
 
 std::uint8_t HierarchicalGrid::level_of(double radius) const {
-  int exponent = 0;
-  const double mantissa = std::frexp((2 * radius + skin_) / edge_, &exponent);
-  if (mantissa <= 0.5) --exponent;
-  return static_cast<std::uint8_t>(std::clamp(exponent, 0, static_cast<int>(level_count_) - 1));
+  return static_cast<std::uint8_t>(std::clamp(rounded_up_log2((2 * radius + skin_) / edge_), 0, static_cast<int>(level_count_) - 1));
+}
+
+// A level is worth its cells where it thins them out: the finest levels are merged into one that costs the least, which is
+// measured as the particles in a particle's cell there, and a fixed price for every level that remains to be searched.
+void HierarchicalGrid::merge_sparse_levels(std::span<const Record> positions) {
+  constexpr double price_of_level = 15, price_of_empty_level = 1;  // of a cell's particle; measured
+  std::vector<std::size_t> members(level_count_, 0);
+  for (const auto& p : positions) ++members[level_of(p.w)];
+  // Cells are counted in a small table, where they may fall on each other.
+  const auto bits = std::bit_width(2 * positions.size());
+  std::vector<std::uint8_t> population;
+  std::vector<std::size_t> entry;
+  double cheapest = std::numeric_limits<double>::infinity();
+  std::size_t merged = 0;
+  for (std::size_t l = 0; l < level_count_; ++l) {
+    population.assign(std::size_t{1} << bits, 0);
+    entry.clear();
+    for (const auto& p : positions) {
+      if (level_of(p.w) > l) continue;
+      const auto at = coarser(cell_of(p), l);
+      const std::uint64_t mixed = (at[0] * 0x9e3779b97f4a7c15u) ^ (at[1] * 0xc2b2ae3d27d4eb4fu) ^ (at[2] * 0x165667b19e3779f9u);
+      entry.push_back((mixed * 0x9e3779b97f4a7c15u) >> (64 - bits));
+      auto& n = population[entry.back()];
+      n = static_cast<std::uint8_t>(n + (n < 255));
+    }
+    double cost = 0;
+    for (const auto e : entry) cost += population[e];
+    cost /= static_cast<double>(positions.size());
+    if (cost > cheapest) break;  // and coarser ones are worse
+    for (std::size_t k = l + 1; k < level_count_; ++k) cost += members[k] ? price_of_level : price_of_empty_level;
+    if (cost >= cheapest) continue;
+    cheapest = cost;
+    merged = l;
+  }
+  edge_ = std::ldexp(edge_, static_cast<int>(merged));
+  level_count_ -= merged;
 }
 
 void HierarchicalGrid::build(std::span<const Record> positions, double skin) {
@@ -117,54 +156,83 @@ void HierarchicalGrid::build(std::span<const Record> positions, double skin) {
     --level_count_;
   }
   edge_ = std::max({edge_, longest / (most_cells - 2), std::numeric_limits<double>::min()}) * (1 + slack);
-  const double inverse = 1 / edge_;
-  counts_ = {static_cast<std::uint32_t>((high.x - low.x) * inverse) + 1, static_cast<std::uint32_t>((high.y - low.y) * inverse) + 1,
-             static_cast<std::uint32_t>((high.z - low.z) * inverse) + 1};
+  if (level_count_ > 1) merge_sparse_levels(positions);
+  counts_ = cell_of(high);
+  for (auto& n : counts_) ++n;
   rows_around_ = counts_[2] == 1 ? 3 : 9;
 
-  if (levels_.size() < level_count_) levels_.resize(level_count_);
-  at_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto& p = positions[i];
-    at_[i] = {static_cast<std::uint32_t>((p.x - low.x) * inverse), static_cast<std::uint32_t>((p.y - low.y) * inverse),
-              static_cast<std::uint32_t>((p.z - low.z) * inverse)};
-  }
-  level_of_.clear();
-  if (level_count_ > 1) {
-    level_of_.resize(count);
-    for (std::size_t i = 0; i < count; ++i) level_of_[i] = level_of(positions[i].w);
-  }
-  cell_of_.resize(count);
+  home_.resize(count);
   slot_of_.resize(count);
   index_.resize(count + lanes);
   for (auto* values : {&x_, &y_, &z_, &w_}) values->resize(count + lanes);
+  table_.clear();
+  if (level_count_ == 1 && fits_table(count)) {
+    fill_table(positions);
+    return;
+  }
+  if (levels_.size() < level_count_) levels_.resize(level_count_);
+  level_of_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) level_of_[i] = level_of(positions[i].w);
   for (std::size_t l = 0; l < level_count_; ++l) make_level(l, positions);
-  if (level_count_ > 1) link_levels();
+  link_levels();
+}
+
+HierarchicalGrid::Coordinates HierarchicalGrid::cell_of(const Record& p) const {
+  const double inverse = 1 / edge_;
+  return {static_cast<std::uint32_t>((p.x - low_[0]) * inverse), static_cast<std::uint32_t>((p.y - low_[1]) * inverse),
+          static_cast<std::uint32_t>((p.z - low_[2]) * inverse)};
+}
+
+// Cells are numbered row by row and layer by layer. One empty cell at the end of every row and one empty row at the end of every
+// layer keep the neighbours of a cell at the border from being those of the next row.
+HierarchicalGrid::Numbering HierarchicalGrid::numbering(std::size_t l) const {
+  const std::uint64_t row = ((counts_[0] - 1) >> l) + 2, layer = row * (((counts_[1] - 1) >> l) + 2);
+  return {row, layer, (deep() ? layer : 0) + row + 1};
+}
+
+// A table of all cells is the fastest, where it is not much larger than the particles themselves.
+bool HierarchicalGrid::fits_table(std::size_t count) const {
+  const auto number = numbering(0);
+  const double layers = deep() ? counts_[2] + 2.0 : 1.0;
+  return static_cast<double>(number.layer) * layers <= std::min(8.0 * static_cast<double>(count) + 512, 0x1p31);
+}
+
+void HierarchicalGrid::fill_table(std::span<const Record> positions) {
+  const auto number = numbering(0);
+  // Counted two entries late and then moved on by placing, it ends as the first slot of each cell.
+  table_.assign(number.layer * (deep() ? counts_[2] + 2 : 1) + 2 * number.row + 4, 0);
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    home_[i] = static_cast<std::uint32_t>(number(cell_of(positions[i])));
+    ++table_[home_[i] + 2];
+  }
+  std::uint32_t sum = 0;
+  for (auto& n : table_) n = sum += n;
+  for (std::uint32_t i = 0; i < positions.size(); ++i) place(i, positions[i], table_[home_[i] + 1]++);
+  std::size_t k = 0;
+  for (int z = deep() ? -1 : 0; z <= (deep() ? 1 : 0); ++z)
+    for (int y = -1; y <= 1; ++y) offsets_[k++] = static_cast<std::uint32_t>(number.offset(y, z));
+}
+
+void HierarchicalGrid::place(std::uint32_t i, const Record& particle, std::uint32_t slot) {
+  x_[slot] = particle.x;
+  y_[slot] = particle.y;
+  z_[slot] = particle.z;
+  w_[slot] = particle.w;
+  index_[slot] = i;
+  slot_of_[i] = slot;
 }
 
 void HierarchicalGrid::make_level(std::size_t l, std::span<const Record> positions) {
   auto& level = levels_[l];
-  const Coordinates counts{((counts_[0] - 1) >> l) + 1, ((counts_[1] - 1) >> l) + 1, ((counts_[2] - 1) >> l) + 1};
-  // One empty cell at the end of every row and one empty row at the end of every layer keep neighbours of the border from being
-  // those of the next row.
-  const std::uint64_t row = counts[0] + 1, layer = row * (counts[1] + 1);
-  const auto key_of = [&](const Coordinates& at) {
-    return (at[2] >> l) * layer + (at[1] >> l) * row + (at[0] >> l) + layer + row + 1;
-  };
+  const auto number = numbering(l);
   entries_.clear();
-  if (level_count_ == 1) {
-    entries_.resize(positions.size());
-    for (std::uint32_t i = 0; i < positions.size(); ++i) entries_[i] = {key_of(at_[i]), i, false};
-  } else {
-    for (std::uint32_t i = 0; i < positions.size(); ++i)
-      if (level_of_[i] == l) entries_.push_back({key_of(at_[i]), i, false});
-  }
+  for (std::uint32_t i = 0; i < positions.size(); ++i)
+    if (level_of_[i] == l) entries_.push_back({number(coarser(cell_of(positions[i]), l)), i, false});
   auto* const finer = l > 0 ? &levels_[l - 1] : nullptr;
   if (finer) {
-    finer->parent.resize(finer->size());
-    for (std::uint32_t c = 0; c < finer->size(); ++c) {
-      const auto& at = finer->at[c];
-      entries_.push_back({(at[2] >> 1) * layer + (at[1] >> 1) * row + (at[0] >> 1) + layer + row + 1, c, true});
+    finer->parent.resize(finer->cells());
+    for (std::uint32_t c = 0; c < finer->cells(); ++c) {
+      entries_.push_back({number(coarser(finer->at[c], 1)), c, true});
     }
   }
   sort_by_key(entries_, entries_scratch_);
@@ -180,9 +248,7 @@ void HierarchicalGrid::make_level(std::size_t l, std::span<const Record> positio
     if (entry.key != last) {
       last = entry.key;
       level.key.push_back(entry.key);
-      const auto& at = entry.is_cell ? finer->at[entry.item] : at_[entry.item];
-      const auto down = entry.is_cell ? 1 : l;
-      level.at.push_back({at[0] >> down, at[1] >> down, at[2] >> down});
+      level.at.push_back(entry.is_cell ? coarser(finer->at[entry.item], 1) : coarser(cell_of(positions[entry.item]), l));
       level.first.push_back(slot);
       level.highest.push_back(0);
     }
@@ -193,70 +259,76 @@ void HierarchicalGrid::make_level(std::size_t l, std::span<const Record> positio
     }
     const auto i = entry.item;
     const auto& p = positions[i];
-    x_[slot] = p.x;
-    y_[slot] = p.y;
-    z_[slot] = p.z;
-    w_[slot] = p.w;
-    index_[slot] = i;
-    cell_of_[i] = cell;
-    slot_of_[i] = slot++;
+    home_[i] = cell;
+    place(i, p, slot++);
     level.highest.back() = std::max(level.highest.back(), i + 1);
     level.largest = std::max(level.largest, p.w);
   }
   level.first.push_back(slot);
+  for (int k = 0; k < 3; ++k) level.key.push_back(std::numeric_limits<std::uint64_t>::max());
+  level.at.push_back({});
+  level.size = std::ldexp(1.0, static_cast<int>(l));
   level.largest_to_here = finer ? std::max(finer->largest_to_here, level.largest) : level.largest;
-  link_rows(level, counts);
+  link_rows(level, number);
 }
 
-// Both the cells and the cells beside them in a row at a given distance come in ascending order, so that one sweep finds all.
-void HierarchicalGrid::link_rows(Level& level, const Coordinates& counts) const {
-  const auto cells = level.key.size();
-  const std::int64_t row = counts[0] + 1, layer = row * (counts[1] + 1);
-  for (int k = 0; k < 3; ++k) level.key.push_back(std::numeric_limits<std::uint64_t>::max());
-  level.around.resize(cells * rows_around_);
-  const std::uint64_t* const key = level.key.data();
+namespace {
+
+// For cells in ascending order and as many ascending numbers, `number(c)`: the range of `keys`, ascending too, from number(c) to
+// number(c) + width − 1, width ≤ 3. One sweep.
+void link(std::size_t cells, const auto& number, std::uint64_t width, const std::vector<std::uint64_t>& keys, const auto& set) {
+  const std::uint64_t* const key = keys.data();
+  std::uint32_t begin = 0;
+  for (std::size_t c = 0; c < cells; ++c) {
+    const auto first = number(c), past = first + width;
+    while (key[begin] < first) ++begin;
+    set(c, begin, begin + (key[begin] < past) + (key[begin + 1] < past) + (key[begin + 2] < past));
+  }
+}
+
+}  // namespace
+
+void HierarchicalGrid::link_rows(Level& level, const Numbering& number) const {
+  level.around.resize(level.cells() * rows_around_);
   std::size_t k = 0;
-  for (std::int64_t z = rows_around_ == 9 ? -1 : 0; z <= (rows_around_ == 9 ? 1 : 0); ++z)
-    for (std::int64_t y = -1; y <= 1; ++y, ++k) {
-      const auto offset = static_cast<std::uint64_t>(z * layer + y * row);
-      CellRange* to = level.around.data() + k;
-      std::uint32_t begin = 0;
-      for (std::size_t c = 0; c < cells; ++c, to += rows_around_) {
-        const auto left = key[c] + offset - 1, right = left + 2;
-        while (key[begin] < left) ++begin;
-        *to = {begin, begin + (key[begin] <= right) + (key[begin + 1] <= right) + (key[begin + 2] <= right)};
-      }
+  for (int z = deep() ? -1 : 0; z <= (deep() ? 1 : 0); ++z)
+    for (int y = -1; y <= 1; ++y, ++k) {
+      const auto before = number.offset(y, z) - 1;
+      link(level.cells(), [&](std::size_t c) { return level.key[c] + before; }, 3, level.key,
+           [&](std::size_t c, std::uint32_t begin, std::uint32_t end) { level.around[c * rows_around_ + k] = {begin, end}; });
     }
 }
 
 void HierarchicalGrid::link_levels() {
-  levels_[0].highest_finer.assign(levels_[0].size(), 0);
+  levels_[0].highest_finer.assign(levels_[0].cells(), 0);
   for (std::size_t l = 1; l < level_count_; ++l) {
     auto &level = levels_[l], &finer = levels_[l - 1];
-    level.highest_finer.assign(level.size(), 0);
-    level.children.assign(level.size(), {});
-    for (std::uint32_t c = 0; c < finer.size(); ++c) {
-      const auto parent = finer.parent[c];
-      auto& highest = level.highest_finer[parent];
+    level.highest_finer.assign(level.cells(), 0);
+    for (std::size_t c = 0; c < finer.cells(); ++c) {
+      auto& highest = level.highest_finer[finer.parent[c]];
       highest = std::max({highest, finer.highest[c], finer.highest_finer[c]});
-      auto& children = level.children[parent][(finer.at[c][1] & 1) + 2 * (finer.at[c][2] & 1)];
-      if (children.begin == children.end) children = {c, c + 1};
-      else children.end = c + 1;
     }
+    level.children.resize(level.cells());
+    const auto number = numbering(l - 1);
+    for (std::uint32_t k = 0; k < (deep() ? 4 : 2); ++k)
+      link(level.cells(),
+           [&](std::size_t c) {
+             const auto& at = level.at[c];
+             return number({2 * at[0], 2 * at[1] + (k & 1), 2 * at[2] + (k >> 1)});
+           },
+           2, finer.key, [&](std::size_t c, std::uint32_t begin, std::uint32_t end) { level.children[c][k] = {begin, end}; });
   }
   for (std::size_t l = level_count_; l-- > 0;) {
     auto& level = levels_[l];
-    level.coarser_cell.assign(level.size(), 0);
-    level.coarser_level.assign(level.size(), none);
+    level.coarser_cell.assign(level.cells(), 0);
+    level.coarser_level.assign(level.cells(), none);
     if (l + 1 == level_count_) continue;
     const auto& coarser = levels_[l + 1];
-    for (std::size_t c = 0; c < level.size(); ++c) {
+    for (std::size_t c = 0; c < level.cells(); ++c) {
       const auto parent = level.parent[c];
-      bool populated = false;
-      for (std::size_t k = 0; k < rows_around_; ++k) {
-        const auto& range = coarser.around[parent * rows_around_ + k];
-        populated = populated || coarser.first[range.begin] != coarser.first[range.end];
-      }
+      const auto* const around = coarser.around.data() + parent * rows_around_;
+      const bool populated =
+          std::any_of(around, around + rows_around_, [&](const CellRange& r) { return coarser.first[r.begin] != coarser.first[r.end]; });
       level.coarser_cell[c] = populated ? parent : coarser.coarser_cell[parent];
       level.coarser_level[c] = populated ? static_cast<std::uint8_t>(l + 1) : coarser.coarser_level[parent];
     }
@@ -264,56 +336,74 @@ void HierarchicalGrid::link_levels() {
 }
 
 std::size_t HierarchicalGrid::cells() const {
-  std::size_t sum = 0;
-  for (std::size_t l = 0; l < level_count_; ++l) sum += levels_[l].size();
+  std::size_t sum = table_.size();
+  for (std::size_t l = 0; l < level_count_ && table_.empty(); ++l) sum += levels_[l].cells();
   return sum;
 }
 
 // --- searching
 
-// The search of one particle's partners after the other's.
+namespace {
+
+using Indices = std::uint32_t __attribute__((vector_size(4 * lanes)));
+
+// Sorts eight numbers: Batcher's odd-even merge sort as six rounds of comparing each lane with another.
+Indices sorted(Indices v) {
+  const auto round = [&v](const Indices& partner, const Indices& keeps_larger) {
+    const Indices other = __builtin_shuffle(v, partner);
+    v = static_cast<Indices>(v > other) == -keeps_larger ? v : other;
+  };
+  round(Indices{1, 0, 3, 2, 5, 4, 7, 6}, Indices{0, 1, 0, 1, 0, 1, 0, 1});
+  round(Indices{2, 3, 0, 1, 6, 7, 4, 5}, Indices{0, 0, 1, 1, 0, 0, 1, 1});
+  round(Indices{0, 2, 1, 3, 4, 6, 5, 7}, Indices{0, 0, 1, 0, 0, 0, 1, 0});
+  round(Indices{4, 5, 6, 7, 0, 1, 2, 3}, Indices{0, 0, 0, 0, 1, 1, 1, 1});
+  round(Indices{0, 1, 4, 5, 2, 3, 6, 7}, Indices{0, 0, 0, 0, 1, 1, 0, 0});
+  round(Indices{0, 2, 1, 4, 3, 6, 5, 7}, Indices{0, 0, 1, 0, 1, 0, 1, 0});
+  return v;
+}
+
+// Sorts a row that may be followed by `lanes` numbers that do not matter. Most rows are short: those without a branch.
+void sort_row(std::uint32_t* begin, std::uint32_t* end) {
+  const auto count = static_cast<std::uint32_t>(end - begin);
+  if (count > lanes) {
+    std::sort(begin, end);
+    return;
+  }
+  constexpr Indices place{0, 1, 2, 3, 4, 5, 6, 7};
+  Indices row;
+  std::memcpy(&row, begin, sizeof row);
+  row = sorted(place < count ? row : ~Indices{});
+  std::memcpy(begin, &row, sizeof row);
+}
+
+#if defined(__AVX2__) && !defined(__AVX512VL__)
+// Lanes in which a mask of eight bits is set, first to last.
+constexpr auto set_lanes = [] {
+  std::array<std::array<std::uint8_t, lanes>, 256> table{};
+  for (std::size_t mask = 0; mask < table.size(); ++mask)
+    for (std::size_t lane = 0, n = 0; lane < lanes; ++lane)
+      if (mask >> lane & 1) table[mask][n++] = static_cast<std::uint8_t>(lane);
+  return table;
+}();
+#endif
+
+}  // namespace
+
+// One particle's search for partners.
 struct HierarchicalGrid::Search {
-  const HierarchicalGrid& grid;
-  PairList& rows;
-  const double *const x = grid.x_.data(), *const y = grid.y_.data(), *const z = grid.z_.data(), *const w = grid.w_.data();
-  const std::uint32_t* const index = grid.index_.data();
-  const double inverse = 1 / grid.edge_;
+  const double *x, *y, *z, *w;
+  const std::uint32_t* index;
 
-  // The particle.
-  std::uint32_t i = 0;
-  double px = 0, py = 0, pz = 0, reach = 0;  // reach: its radius and the skin
-  std::array<double, 3> at{};                // in finest cells
+  std::uint32_t i;             // the particle
+  double px, py, pz, reach;    // reach: its radius and the skin
 
-  std::uint32_t found = 0;
-  std::uint64_t examined = 0;
-
-  void begin(std::uint32_t particle) {
-    i = particle;
-    const auto s = grid.slot_of_[i];
-    px = x[s];
-    py = y[s];
-    pz = z[s];
-    reach = w[s] + grid.skin_;
-  }
-
-  // The particles in slots [begin, end).
-  void scan(std::uint32_t begin, std::uint32_t end) {
-    examined += end - begin;
-    make_room(end - begin);
-    found = test(begin, end, rows.second.data() + found) - rows.second.data();
-  }
-
-  void make_room(std::size_t more) {
-    if (rows.second.size() < found + more + lanes) rows.second.resize(2 * (found + more + lanes));
-  }
-
-  // Appends the partners among slots [begin, end) at `out`, which has room for all of them and `lanes` more.
+  // Appends the partners among slots [begin, end) at `out`, where there is room for all of them and `lanes` more.
   [[gnu::always_inline]] inline std::uint32_t* test(std::uint32_t begin, std::uint32_t end, std::uint32_t* out) const {
-#ifdef __AVX512VL__
+#if defined(__AVX512VL__)
     const auto px8 = _mm512_set1_pd(px), py8 = _mm512_set1_pd(py), pz8 = _mm512_set1_pd(pz), reach8 = _mm512_set1_pd(reach);
     const auto i8 = _mm256_set1_epi32(static_cast<int>(i));
     for (auto s = begin; s < end; s += lanes) {
-      const auto valid = static_cast<__mmask8>((1u << std::min<std::size_t>(end - s, lanes)) - 1);
+      const auto valid = static_cast<__mmask8>(end - s >= lanes ? 255u : (1u << (end - s)) - 1);
       const auto partner = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(index + s));
       const auto dx = _mm512_sub_pd(px8, _mm512_loadu_pd(x + s)), dy = _mm512_sub_pd(py8, _mm512_loadu_pd(y + s));
       const auto dz = _mm512_sub_pd(pz8, _mm512_loadu_pd(z + s)), sum = _mm512_add_pd(reach8, _mm512_loadu_pd(w + s));
@@ -322,6 +412,24 @@ struct HierarchicalGrid::Search {
       const auto near = _mm512_mask_cmp_pd_mask(later, square, _mm512_mul_pd(sum, sum), _CMP_LT_OQ);
       _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm256_maskz_compress_epi32(near, partner));
       out += std::popcount(static_cast<unsigned>(near));
+    }
+#elif defined(__AVX2__)
+    const auto px4 = _mm256_set1_pd(px), py4 = _mm256_set1_pd(py), pz4 = _mm256_set1_pd(pz), reach4 = _mm256_set1_pd(reach);
+    const auto near_four = [&](std::uint32_t s) {
+      const auto dx = _mm256_sub_pd(px4, _mm256_loadu_pd(x + s)), dy = _mm256_sub_pd(py4, _mm256_loadu_pd(y + s));
+      const auto dz = _mm256_sub_pd(pz4, _mm256_loadu_pd(z + s)), sum = _mm256_add_pd(reach4, _mm256_loadu_pd(w + s));
+      const auto square = _mm256_add_pd(_mm256_mul_pd(dz, dz), _mm256_add_pd(_mm256_mul_pd(dy, dy), _mm256_mul_pd(dx, dx)));
+      return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(square, _mm256_mul_pd(sum, sum), _CMP_LT_OQ)));
+    };
+    const auto i8 = _mm256_set1_epi32(static_cast<int>(i));  // indices are below 2³¹
+    for (auto s = begin; s < end; s += lanes) {
+      const auto valid = end - s >= lanes ? 255u : (1u << (end - s)) - 1;
+      const auto partner = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(index + s));
+      const auto later = static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(partner, i8))));
+      const auto near = valid & later & (near_four(s) | near_four(s + 4) << 4);
+      const auto lane = _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(set_lanes[near].data())));
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm256_permutevar8x32_epi32(partner, lane));
+      out += std::popcount(near);
     }
 #else
     for (auto s = begin; s < end; ++s) {
@@ -332,104 +440,20 @@ struct HierarchicalGrid::Search {
 #endif
     return out;
   }
-
-  // All rows of cells around a cell of the particle's own level, when it is the only one.
-  void scan_around(const Level& level, std::uint32_t cell) {
-    const CellRange* const around = level.around.data() + cell * grid.rows_around_;
-    std::array<CellRange, 9> slots;
-    std::uint32_t sum = 0;
-    for (std::size_t k = 0; k < grid.rows_around_; ++k) {
-      slots[k] = {level.first[around[k].begin], level.first[around[k].end]};
-      sum += slots[k].end - slots[k].begin;
-    }
-    examined += sum;
-    make_room(sum);
-    const Search self = *this;
-    std::uint32_t* out = rows.second.data() + found;
-    for (std::size_t k = 0; k < grid.rows_around_; ++k) out = self.test(slots[k].begin, slots[k].end, out);
-    found = out - rows.second.data();
-  }
-
-  // The same for a cell of level l that contains the particle's centre, without cells out of reach.
-  void scan_near(std::size_t l, std::uint32_t cell) {
-    const auto& level = grid.levels_[l];
-    const double shrink = std::exp2(-static_cast<double>(l));
-    const double near = ((reach + level.largest) * inverse + slack) * shrink;
-    const auto& centre = level.at[cell];
-    const std::array<double, 3> inside{at[0] * shrink - centre[0], at[1] * shrink - centre[1], at[2] * shrink - centre[2]};
-    const auto out_of_reach = [&](std::size_t d, std::int64_t step) {
-      return step < 0 ? inside[d] >= near : step > 0 && 1 - inside[d] >= near;
-    };
-    const CellRange* range = level.around.data() + cell * grid.rows_around_;
-    const int deep = grid.rows_around_ == 9;
-    for (int dz = -deep; dz <= deep; ++dz)
-      for (int dy = -1; dy <= 1; ++dy, ++range) {
-        if (range->begin == range->end || out_of_reach(1, dy) || out_of_reach(2, dz)) continue;
-        auto [begin, end] = *range;
-        if (out_of_reach(0, -1) && level.at[begin][0] < centre[0]) ++begin;
-        if (begin < end && out_of_reach(0, 1) && level.at[end - 1][0] > centre[0]) --end;
-        std::uint32_t highest = 0;
-        for (auto c = begin; c < end; ++c) highest = std::max(highest, level.highest[c]);
-        if (highest > i + 1) scan(level.first[begin], level.first[end]);
-      }
-  }
-
-  // Finer particles inside a cell of level l.
-  void descend(std::size_t l, std::uint32_t cell) {
-    const auto& finer = grid.levels_[l - 1];
-    const double size = std::exp2(static_cast<double>(l - 1));
-    const double near = (reach + finer.largest_to_here) * inverse + slack;
-    for (const auto& children : grid.levels_[l].children[cell])
-      for (auto c = children.begin; c < children.end; ++c) {
-        const bool own = finer.highest[c] > i + 1, below = finer.highest_finer[c] > i + 1;
-        if (!own && !below) continue;
-        ++examined;
-        double square = 0;
-        for (std::size_t d = 0; d < 3; ++d) {
-          const double from = finer.at[c][d] * size, outside = std::max({from - at[d], at[d] - from - size, 0.0});
-          square += outside * outside;
-        }
-        if (square >= near * near) continue;
-        if (own) scan(finer.first[c], finer.first[c + 1]);
-        if (below) descend(l - 1, c);
-      }
-  }
-
-  void scan_levels() {
-    at = {(px - grid.low_[0]) * inverse, (py - grid.low_[1]) * inverse, (pz - grid.low_[2]) * inverse};
-    const std::size_t l = grid.level_of_[i];
-    const auto& level = grid.levels_[l];
-    const auto cell = grid.cell_of_[i];
-    scan_near(l, cell);
-    auto at_level = l;
-    auto at_cell = cell;
-    while (grid.levels_[at_level].coarser_level[at_cell] != none) {
-      const auto next_level = grid.levels_[at_level].coarser_level[at_cell];
-      at_cell = grid.levels_[at_level].coarser_cell[at_cell];
-      at_level = next_level;
-      scan_near(at_level, at_cell);
-    }
-    if (l == 0) return;
-    const CellRange* const around = level.around.data() + cell * grid.rows_around_;
-    for (std::size_t k = 0; k < grid.rows_around_; ++k)
-      for (auto c = around[k].begin; c < around[k].end; ++c)
-        if (level.highest_finer[c] > i + 1) descend(l, c);
-  }
 };
+
+HierarchicalGrid::Search HierarchicalGrid::search_of(std::uint32_t i) const {
+  const auto s = slot_of_[i];
+  return {x_.data(), y_.data(), z_.data(), w_.data(), index_.data(), i, x_[s], y_[s], z_[s], w_[s] + skin_};
+}
 
 namespace {
 
-void sort_row(std::uint32_t* begin, std::uint32_t* end) {
-  if (end - begin > 24) {
-    std::sort(begin, end);
-    return;
-  }
-  for (auto* k = begin + 1; k < end; ++k) {
-    const auto value = *k;
-    auto* hole = k;
-    for (; hole != begin && hole[-1] > value; --hole) *hole = hole[-1];
-    *hole = value;
-  }
+// Where the next partners go: the end of the list so far, with room for so many.
+std::uint32_t* room(PairList& rows, std::uint32_t found, std::size_t more) {
+  const auto needed = found + more + lanes;
+  if (rows.second.size() < needed) rows.second.resize(2 * needed);
+  return rows.second.data() + found;
 }
 
 }  // namespace
@@ -437,18 +461,140 @@ void sort_row(std::uint32_t* begin, std::uint32_t* end) {
 void HierarchicalGrid::find_pairs(std::uint32_t first, std::uint32_t last, PairList& rows) const {
   rows.start.resize(last - first + 1);
   rows.start[0] = 0;
-  rows.second.resize(rows.second.capacity());
-  Search search{*this, rows};
-  for (auto i = first; i < last; ++i) {
-    const auto begin = search.found;
-    search.begin(i);
-    if (level_count_ == 1) search.scan_around(levels_[0], cell_of_[i]);
-    else search.scan_levels();
-    sort_row(rows.second.data() + begin, rows.second.data() + search.found);
-    rows.start[i - first + 1] = search.found;
+  rows.examined = 0;
+  rows.second.resize(std::max<std::size_t>(rows.second.capacity(), lanes));
+  std::uint32_t found = 0;
+  const auto search_rows = [&](const auto& search) {
+    for (auto i = first; i < last; ++i) {
+      const auto begin = found;
+      found = search(i, begin);
+      sort_row(room(rows, begin, 0), rows.second.data() + found);
+      rows.start[i - first + 1] = found;
+    }
+  };
+  if (!table_.empty()) search_rows([&](std::uint32_t i, std::uint32_t begin) { return search_table(i, begin, rows); });
+  else search_rows([&](std::uint32_t i, std::uint32_t begin) { return search_levels(i, begin, rows); });
+  rows.second.resize(found);
+}
+
+inline std::uint32_t HierarchicalGrid::search_table(std::uint32_t i, std::uint32_t found, PairList& rows) const {
+  const auto search = search_of(i);
+  std::array<CellRange, 9> slots;
+  std::uint32_t sum = 0;
+  for (std::size_t k = 0; k < rows_around_; ++k) {
+    const auto* const middle = table_.data() + (home_[i] + offsets_[k]);
+    slots[k] = {middle[-1], middle[2]};
+    sum += slots[k].end - slots[k].begin;
   }
-  rows.second.resize(search.found);
-  rows.examined = search.examined;
+  rows.examined += sum;
+  auto* out = room(rows, found, sum);
+  for (std::size_t k = 0; k < rows_around_; ++k) out = search.test(slots[k].begin, slots[k].end, out);
+  return static_cast<std::uint32_t>(out - rows.second.data());
+}
+
+// The search through the levels.
+struct HierarchicalGrid::Climb {
+  const HierarchicalGrid& grid;
+  const Search& search;
+  PairList& rows;
+  std::uint32_t found;
+  const double inverse = 1 / grid.edge_;
+  const std::array<double, 3> at{(search.px - grid.low_[0]) * inverse, (search.py - grid.low_[1]) * inverse,
+                                 (search.pz - grid.low_[2]) * inverse};  // in finest cells
+
+  void test(std::uint32_t begin, std::uint32_t end) {
+    rows.examined += end - begin;
+    auto* const out = room(rows, found, end - begin);
+    found = static_cast<std::uint32_t>(search.test(begin, end, out) - rows.second.data());
+  }
+
+  // Particles of level l: in the cell that contains the centre and in those around it that are within reach. As few branches as
+  // can be, since nobody could predict them.
+  void across(std::size_t l, std::uint32_t cell) {
+    const auto& level = grid.levels_[l];
+    const double near = (search.reach + level.largest) * inverse + slack;
+    const auto& centre = level.at[cell];
+    // Along each axis, whether the cells before and after are within reach.
+    std::array<std::array<bool, 3>, 3> within;
+    for (std::size_t d = 0; d < 3; ++d) {
+      const double inside = at[d] - level.size * centre[d];
+      within[d] = {inside < near, true, level.size - inside < near};
+    }
+    std::array<CellRange, 9> slots;
+    std::size_t count = 0;
+    std::uint32_t sum = 0;
+    const CellRange* range = level.around.data() + cell * grid.rows_around_;
+    for (std::size_t z = grid.deep() ? 0 : 1; z <= (grid.deep() ? 2 : 1); ++z)
+      for (std::size_t y = 0; y < 3; ++y, ++range) {
+        auto [begin, end] = *range;
+        begin += static_cast<std::uint32_t>(!within[0][0] & (begin < end) & (level.at[begin][0] < centre[0]));
+        end -= static_cast<std::uint32_t>(!within[0][2] & (begin < end) & (level.at[std::max(end, 1u) - 1][0] > centre[0]));
+        slots[count] = {level.first[begin], level.first[end]};
+        const auto length = within[1][y] & within[2][z] ? slots[count].end - slots[count].begin : 0;
+        count += length > 0;
+        sum += length;
+      }
+    rows.examined += sum;
+    auto* out = room(rows, found, sum);
+    for (std::size_t k = 0; k < count; ++k) out = search.test(slots[k].begin, slots[k].end, out);
+    found = static_cast<std::uint32_t>(out - rows.second.data());
+  }
+
+  // Particles of levels below l in the cells [begin, end) of level l, which lie in one row: the cells inside them lie in four.
+  void down(std::size_t l, std::uint32_t begin, std::uint32_t end) {
+    const auto& finer = grid.levels_[l - 1];
+    const auto& children = grid.levels_[l].children;
+    const double near = (search.reach + finer.largest_to_here) * inverse + slack;
+    for (std::size_t k = 0; k < (grid.deep() ? 4 : 2); ++k) {
+      auto from = children[begin][k].begin, to = children[end - 1][k].end;
+      if (from == to) continue;
+      ++rows.examined;
+      double chord = near * near;
+      for (std::size_t d = 1; d < 3; ++d) {
+        const double low = finer.at[from][d] * finer.size, outside = std::max({low - at[d], at[d] - low - finer.size, 0.0});
+        chord -= outside * outside;
+      }
+      if (chord <= 0) continue;
+      const double half = std::sqrt(chord);
+      const auto* const cells = finer.at.data();
+      from = static_cast<std::uint32_t>(first_not(cells + from, cells + to, [&](const Coordinates& c) { return (c[0] + 1) * finer.size <= at[0] - half; }) - cells);
+      to = static_cast<std::uint32_t>(first_not(cells + from, cells + to, [&](const Coordinates& c) { return c[0] * finer.size < at[0] + half; }) - cells);
+      if (from == to) continue;
+      if (finer.first[from] < finer.first[to]) test(finer.first[from], finer.first[to]);
+      if (l > 1) down(l - 1, from, to);
+    }
+  }
+
+  // The first element that does not fulfil a condition which a run of first elements fulfils.
+  static const Coordinates* first_not(const Coordinates* begin, const Coordinates* end, const auto& condition) {
+    if (end - begin > 8) return std::partition_point(begin, end, condition);
+    while (begin < end && condition(*begin)) ++begin;
+    return begin;
+  }
+};
+
+std::uint32_t HierarchicalGrid::search_levels(std::uint32_t i, std::uint32_t found, PairList& rows) const {
+  const auto search = search_of(i);
+  Climb climb{*this, search, rows, found};
+  std::size_t l = level_of_[i];
+  auto cell = home_[i];
+  climb.across(l, cell);
+  if (l > 0) {
+    const auto& level = levels_[l];
+    const CellRange* const around = level.around.data() + cell * rows_around_;
+    for (std::size_t k = 0; k < rows_around_; ++k) {
+      std::uint32_t highest = 0;
+      for (auto c = around[k].begin; c < around[k].end; ++c) highest = std::max(highest, level.highest_finer[c]);
+      if (highest > i + 1) climb.down(l, around[k].begin, around[k].end);
+    }
+  }
+  while (levels_[l].coarser_level[cell] != none) {
+    const auto coarser = levels_[l].coarser_level[cell];
+    cell = levels_[l].coarser_cell[cell];
+    l = coarser;
+    climb.across(l, cell);
+  }
+  return climb.found;
 }
 
 // --- ordering

@@ -46,7 +46,7 @@ class HierarchicalGrid {
   /// depend on how they are split into ranges, nor on the thread. Reads only; several threads may call it on lists of their own.
   void find_pairs(std::uint32_t first, std::uint32_t last, PairList& rows) const;
 
-  std::size_t size() const { return cell_of_.size(); }
+  std::size_t size() const { return home_.size(); }
   std::size_t levels() const { return level_count_; }
   /// Cells of all levels that are kept in memory: those that hold particles, of their own level or of finer ones.
   std::size_t cells() const;
@@ -61,29 +61,52 @@ class HierarchicalGrid {
     bool is_cell;  // of the next finer level; else a particle
   };
   using Coordinates = std::array<std::uint32_t, 3>;
+  static Coordinates coarser(const Coordinates& at, std::size_t levels) { return {at[0] >> levels, at[1] >> levels, at[2] >> levels}; }
 
   // The cells of one level in rows along x, rows along y, and those along z; only cells that hold something.
   struct Level {
-    std::vector<std::uint64_t> key;            // ascending; sentinels at the end
-    std::vector<Coordinates> at;               // in cells of this level
+    std::vector<std::uint64_t> key;            // ascending; three sentinels at the end
+    std::vector<Coordinates> at;               // in cells of this level; one more at the end
     std::vector<std::uint32_t> first;          // slot of the first particle; one more at the end
     std::vector<CellRange> around;             // `rows_around_` a cell: the cells beside it and in the rows around it
     std::vector<std::uint32_t> highest;        // of its own particles, index + 1; 0: none
     std::vector<std::uint32_t> highest_finer;  // of the particles in finer cells inside it
     std::vector<std::uint32_t> parent;         // cell of the next coarser level
-    std::vector<std::array<CellRange, 4>> children;
+    std::vector<std::array<CellRange, 4>> children;  // cells of the next finer level inside it, by row
     std::vector<std::uint32_t> coarser_cell;   // the nearest cell that contains it and has particles in or around it,
     std::vector<std::uint8_t> coarser_level;   // and its level; `none` where there is no such cell
+    std::size_t cells() const { return first.size() - 1; }
+    double size = 1;                           // of a cell, in finest cells
     double largest = 0, largest_to_here = 0;   // radius in this level, and in this and finer ones
-    std::size_t size() const { return at.size(); }
   };
   static constexpr std::uint8_t none = 255;
 
-  struct Search;
+  // Numbers of the cells of one level.
+  struct Numbering {
+    std::uint64_t row, layer, corner;
+    std::uint64_t operator()(const Coordinates& at) const { return at[2] * layer + at[1] * row + at[0] + corner; }
+    // What is added to the number of a cell for that of the cell so many rows and layers away (modulo 2⁶⁴).
+    std::uint64_t offset(int rows, int layers) const {
+      return static_cast<std::uint64_t>(layers) * layer + static_cast<std::uint64_t>(rows) * row;
+    }
+  };
 
+  struct Search;
+  struct Climb;
+  Search search_of(std::uint32_t i) const;
+  std::uint32_t search_table(std::uint32_t i, std::uint32_t found, PairList& rows) const;
+  std::uint32_t search_levels(std::uint32_t i, std::uint32_t found, PairList& rows) const;
+
+  bool deep() const { return rows_around_ == 9; }
+  Coordinates cell_of(const Record& p) const;
+  void merge_sparse_levels(std::span<const Record> positions);
   void choose_levels(std::span<const Record> positions, double smallest, double largest);
+  Numbering numbering(std::size_t l) const;
+  bool fits_table(std::size_t count) const;
+  void fill_table(std::span<const Record> positions);
+  void place(std::uint32_t i, const Record& particle, std::uint32_t slot);
   void make_level(std::size_t l, std::span<const Record> positions);
-  void link_rows(Level& level, const Coordinates& counts) const;
+  void link_rows(Level& level, const Numbering& number) const;
   void link_levels();
   std::uint8_t level_of(double radius) const;
 
@@ -91,11 +114,12 @@ class HierarchicalGrid {
   std::array<double, 3> low_{};
   Coordinates counts_{};  // of the finest cells
   std::size_t level_count_ = 0, rows_around_ = 9;
+  std::vector<std::uint32_t> table_;  // first slot of cell c at c; empty where there are levels instead
+  std::array<std::uint32_t, 9> offsets_{};  // in the table, of the rows around a cell
   std::vector<Level> levels_;
 
-  std::vector<Coordinates> at_;                    // finest cell of each particle
-  std::vector<std::uint8_t> level_of_;             // of each particle; empty with one level
-  std::vector<std::uint32_t> cell_of_, slot_of_;   // of each particle: cell in its level, place in the arrays below
+  std::vector<std::uint32_t> home_, slot_of_;      // of each particle: cell in its level, place in the arrays below
+  std::vector<std::uint8_t> level_of_;             // of each particle, where there are levels
   std::vector<double> x_, y_, z_, w_;              // by level and cell, padded
   std::vector<std::uint32_t> index_;               // which particle
   std::vector<Entry> entries_, entries_scratch_;
@@ -106,5 +130,20 @@ class HierarchicalGrid {
 /// @param order  entry k is the index of the particle that should be k-th: what Particles::reorder wants
 /// @throws std::invalid_argument where a number is not finite
 void curve_order(std::span<const Record> positions, std::vector<std::uint32_t>& order);
+
+/// The same behind the calls of dem/engine_of.h: `reach` is the largest distance of two centres that must be found.
+class CellGrid {
+ public:
+  void build(const std::vector<Record>& positions, double /*reach*/) { curve_order(positions, order_); }
+  const std::vector<std::uint32_t>& order() const { return order_; }
+  void find_pairs(const std::vector<Record>& positions, double skin, PairList& pairs) {
+    grid_.build(positions, skin);
+    grid_.find_pairs(0, static_cast<std::uint32_t>(positions.size()), pairs);
+  }
+
+ private:
+  HierarchicalGrid grid_;
+  std::vector<std::uint32_t> order_;
+};
 
 }  // namespace acopla::dem

@@ -4,10 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
 #include "dem/contact/restitution.h"
+#include "dem/feeding/read.h"
 #include "dem/laws.h"
 #include "dem/wall/read.h"
 
@@ -15,20 +18,47 @@ namespace acopla::dem {
 
 std::size_t Scene::particle_count() const {
   std::size_t count = 0;
-  for (const auto& insertion : insertions) count += insertion.count;
+  for (std::size_t k = 0; k < fillings.size(); ++k)
+    count += fillings[k].placing == Placing::given ? fillings[k].particles.size() : radii_of(fillings[k], k, fill_settings()).size();
   return count;
 }
 
 std::vector<std::uint8_t> Scene::particle_materials() const {
   std::set<std::uint8_t> used;
-  for (const auto& insertion : insertions) used.insert(insertion.material);
+  for (const auto& filling : fillings) {
+    if (filling.placing != Placing::given) used.insert(filling.material);
+    for (const auto& particle : filling.particles) used.insert(particle.material);
+  }
+  for (const auto& inlet : inlets) used.insert(inlet.material);
   return {used.begin(), used.end()};
 }
 
 std::vector<geometry::Box> Scene::regions() const {
   std::vector<geometry::Box> boxes;
-  for (const auto& insertion : insertions) boxes.push_back({insertion.low, insertion.high});
+  for (const auto& filling : fillings)
+    if (filling.region) boxes.push_back(filling.region->bounds());
+  for (const auto& inlet : inlets) boxes.push_back(inlet.region.bounds());
+  for (const auto& outlet : outlets) boxes.push_back(outlet.region.bounds());
   return boxes;
+}
+
+double Scene::smallest_radius(std::size_t material) const {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const auto& filling : fillings) {
+    if (filling.placing != Placing::given && filling.material == material) smallest = std::min(smallest, filling.smallest_radius());
+    for (const auto& particle : filling.particles)
+      if (particle.material == material) smallest = std::min(smallest, particle.radius);
+  }
+  for (const auto& inlet : inlets)
+    if (inlet.material == material) smallest = std::min(smallest, inlet.sizes.smallest_radius());
+  return std::isfinite(smallest) ? smallest : 0;
+}
+
+double Scene::largest_radius() const {
+  double largest = 0;
+  for (const auto& filling : fillings) largest = std::max(largest, filling.largest_radius());
+  for (const auto& inlet : inlets) largest = std::max(largest, inlet.sizes.largest_radius());
+  return largest;
 }
 
 std::vector<LawSet> Scene::law_sets() const {
@@ -71,9 +101,10 @@ class Reader {
     table_.text("solver");
     table_.optional_number("advance_limit", io::positive);  // the coupler's key
     read_laws();
+    scene_.seed = static_cast<std::uint64_t>(table_.integer("seed", 0, std::numeric_limits<std::int64_t>::max(), 1));
     read_materials();
     read_walls();
-    read_insertions();
+    read_feeding();
     read_contacts();
     read_numbers();
     table_.reject_unknown();
@@ -107,13 +138,6 @@ class Reader {
     if (scene_.materials.size() > 200) table_.fail("material", "names more than 200 materials.");
   }
 
-  std::uint8_t material(const io::Table& table) const {
-    std::vector<std::string> names;
-    for (const auto& known : scene_.materials) names.push_back(known.name);
-    const auto name = table.choice("material", names);
-    return static_cast<std::uint8_t>(std::find(names.begin(), names.end(), name) - names.begin());
-  }
-
   void read_walls() {
     std::vector<std::string> names;
     for (const auto& known : scene_.materials) names.push_back(known.name);
@@ -121,23 +145,18 @@ class Reader {
       scene_.walls.push_back(read_wall(table, name, names, scene_.dimension));
   }
 
-  void read_insertions() {
-    for (const auto& table : table_.list("insert")) {
-      Insertion insertion;
-      insertion.material = material(table);
-      insertion.radius = table.number("diameter", io::positive) / 2;
-      insertion.count = static_cast<std::size_t>(table.integer("count", 1, 2'000'000'000));
-      const auto corners = table.table("region").vectors("box", 3);
-      if (corners.size() != 2) table.fail("region", "box must be two corners, [[x, y, z], [x, y, z]].");
-      insertion.low = corners[0].cwiseMin(corners[1]);
-      insertion.high = corners[0].cwiseMax(corners[1]);
-      if (table.has("velocity")) insertion.velocity = table.vector("velocity", 3);
-      insertion.where = table.location("count");
-      if ((insertion.high - insertion.low).minCoeff() < 2 * insertion.radius)
-        table.fail("region", fmt::format("is thinner than one diameter of {:.4g} m: no whole sphere fits.", 2 * insertion.radius));
-      scene_.insertions.push_back(insertion);
+  void read_feeding() {
+    FeedingScope scope{scene_.dimension, {}, {}, scene_.seed};
+    for (const auto& known : scene_.materials) {
+      scope.materials.push_back(known.name);
+      scope.densities.push_back(known.density);
     }
-    if (scene_.insertions.empty()) table_.fail(fmt::format("has no particles. Add [[{}.insert]].", table_.name()));
+    for (const auto& table : table_.list("insert")) scene_.fillings.push_back(read_filling(table, scope));
+    std::size_t index = 0;
+    for (const auto& table : table_.list("inlet")) scene_.inlets.push_back(read_inlet(table, scope, index++));
+    for (const auto& table : table_.list("outlet")) scene_.outlets.push_back(read_outlet(table, scope));
+    if (scene_.fillings.empty() && scene_.inlets.empty())
+      table_.fail(fmt::format("has no particles. Add [[{}.insert]] or [[{}.inlet]].", table_.name(), table_.name()));
   }
 
   // A law is its name, or a table with `law` and its own numbers, which the law declares.
@@ -250,11 +269,20 @@ class Reader {
     pair.rolling_values = contact.rolling;
     // 2 sqrt(5/6) β; in units of the impact α = 2 sqrt(5/6) β sqrt(3/2), because S_n = (3/2) k sqrt(δ).
     const double printed = printed_damping_ratio(contact.restitution);
-    if (pair.laws.normal == Hertz::name)
+    if (!linear)
       pair.hertz_damping = contact.printed_formula ? 2 * std::sqrt(5.0 / 6.0) * printed : dashpot(hertz_impact, contact.restitution) / std::sqrt(1.5);
     pair.damping_ratio = contact.printed_formula ? printed : dashpot(linear_impact, contact.restitution) / 2;
     if (linear) pair.stiffness = stiffness(pair.modulus, i, j, contact);
+    else if (pair.laws.normal != Hertz::name) pair.stiffness = slope(pair, i, j);
     return pair;
+  }
+
+  // Of a user's normal law, for the step: at an overlap of 5 % of the smaller radius.
+  double slope(const PairProperties& pair, std::size_t i, std::size_t j) const {
+    const double a = scene_.smallest_radius(i), b = scene_.smallest_radius(j);
+    const double radius = a > 0 && b > 0 ? a * b / (a + b) : std::max(a, b), smaller = a > 0 && b > 0 ? std::min(a, b) : std::max(a, b);
+    const double mass = scene_.materials[a > 0 ? i : j].density * volume_of(scene_.dimension, smaller);
+    return scene_.laws->make(pair, scene_.dimension)->stiffness(0.05 * smaller, radius, mass, mass * radius * radius).normal;
   }
 
   // The same restitution is usual for all pairs: invert once.
@@ -268,7 +296,7 @@ class Reader {
   // particle's own radius and mass.
   double stiffness(double modulus, std::size_t i, std::size_t j, const ContactEntry& contact) const {
     if (std::isfinite(contact.own(linear_stiffness))) return contact.own(linear_stiffness);
-    const double a = smallest_radius(i), b = smallest_radius(j);
+    const double a = scene_.smallest_radius(i), b = scene_.smallest_radius(j);
     const auto mass_of = [&](std::size_t material, double r) { return scene_.materials[material].density * volume_of(scene_.dimension, r); };
     const double radius = a > 0 && b > 0 ? a * b / (a + b) : std::max(a, b);
     const double mass_a = a > 0 ? mass_of(i, a) : 0, mass_b = b > 0 ? mass_of(j, b) : 0;
@@ -278,19 +306,11 @@ class Reader {
     const double gravity = scene_.gravity.norm();
     if (!(gravity > 0)) table_.fail("contact", "has a drop_height, which needs gravity. Give gravity, or a stiffness.");
     double heaviest = 0, smallest = std::numeric_limits<double>::infinity();
-    for (const auto& insertion : scene_.insertions) {
-      heaviest = std::max(heaviest, mass_of(insertion.material, insertion.radius));
-      smallest = std::min(smallest, insertion.radius);
+    for (const auto material : scene_.particle_materials()) {
+      heaviest = std::max(heaviest, mass_of(material, scene_.largest_radius()));
+      smallest = std::min(smallest, scene_.smallest_radius(material));
     }
     return stiffness_of_fall(heaviest, gravity, contact.own(linear_height), contact.own(linear_overlap) * smallest);
-  }
-
-  // Of a material's particles; 0 where it has none.
-  double smallest_radius(std::size_t material) const {
-    double radius = 0;
-    for (const auto& insertion : scene_.insertions)
-      if (insertion.material == material && (radius == 0 || insertion.radius < radius)) radius = insertion.radius;
-    return radius;
   }
 
   void read_damping() {
@@ -305,7 +325,6 @@ class Reader {
   }
 
   void read_numbers() {
-    scene_.seed = static_cast<std::uint64_t>(table_.integer("seed", 0, std::numeric_limits<std::int64_t>::max(), 1));
     scene_.allow_unstable_step = table_.flag("allow_unstable_step", false);
     scene_.step_fraction = table_.number("step_fraction", io::positive, 0.2);
     scene_.step = table_.optional_number("step", io::positive);

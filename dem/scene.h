@@ -10,6 +10,8 @@
 
 #include "dem/contact/pair_properties.h"
 #include "dem/damping.h"
+#include "dem/feeding/fill.h"
+#include "dem/feeding/inlet.h"
 #include "dem/wall/wall_set.h"
 #include "io/case_table.h"
 
@@ -25,24 +27,6 @@ struct Material {
   double young() const { return 2 * shear_modulus * (1 + poisson); }
 };
 
-/// A particle that comes into a running scene.
-struct NewParticle {
-  Vec3 at;
-  double radius = 0, density = 0;
-  std::uint8_t material = 0;
-  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
-};
-
-/// Spheres of one size, placed at random without overlap.
-struct Insertion {
-  std::uint8_t material = 0;
-  double radius = 0;  ///< [m]
-  std::size_t count = 0;
-  Vec3 low = Vec3::Zero(), high = Vec3::Zero();  ///< whole spheres inside this box [m]
-  Vec3 velocity = Vec3::Zero();                  ///< [m/s]
-  io::Location where;                            ///< in the case, for the message when there is no room
-};
-
 struct Scene {
   std::string name;              ///< of the participant
   int dimension = 3;             ///< 2: discs of unit depth; 3: spheres
@@ -51,7 +35,9 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<PairProperties> pairs;  ///< [i · materials + j], symmetric
   std::vector<Wall> walls;
-  std::vector<Insertion> insertions;
+  std::vector<Filling> fillings;
+  std::vector<Inlet> inlets;
+  std::vector<Outlet> outlets;
   Damping damping;
   std::uint64_t seed = 1;
   double step_fraction = 0.2;
@@ -66,7 +52,12 @@ struct Scene {
   bool write_particles = true;
 
   const PairProperties& pair(std::size_t i, std::size_t j) const { return pairs[i * materials.size() + j]; }
+  /// At the start; inlets come on top.
   std::size_t particle_count() const;
+  FillSettings fill_settings() const { return {dimension, gravity, seed, {}}; }
+  /// Of a material's particles, those of inlets included; 0 where it has none [m].
+  double smallest_radius(std::size_t material) const;
+  double largest_radius() const;
   /// Materials that particles are made of.
   std::vector<std::uint8_t> particle_materials() const;
   /// Boxes around everything that particles are put into.

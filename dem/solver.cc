@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "dem/insertion.h"
+#include "dem/feeding/insertion.h"
 #include "dem/step.h"
 
 namespace acopla::dem {

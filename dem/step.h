@@ -13,9 +13,9 @@ struct CriticalStep {
 };
 
 /// The critical step of a scene before it runs: the Rayleigh time of the particles' materials,
-/// T_R = π r sqrt(ρ/G) / (0.1631 ν + 0.8766), where they have elastic constants, and for linear springs
-/// (2/ω)(sqrt(1 + ζ²) − ζ) with ω² = 2 Σ k_c / (3 m) over twelve contacts. While it runs, Engine::step_ratio() measures
-/// the second limit over the contacts there are.
+/// T_R = π r sqrt(ρ/G) / (0.1631 ν + 0.8766), where they have elastic constants, less for strong dashpots; and for linear springs
+/// (2/ω)(sqrt(1 + 4 ζ²) − 2 ζ) with ω² = 2 Σ k_c / (D m) over the neighbours of a dense packing in D dimensions and ζ of all their
+/// dashpots together. While it runs, Engine::step_ratio() bounds the limit over the contacts there are.
 CriticalStep critical_step(const Scene& scene);
 
 /// The step of a scene before windows divide it: `step`, or step_fraction × critical.

@@ -74,10 +74,9 @@ WallContactList::Group& WallContactList::group_of(const KernelTable& kernels, co
 // that never share a crease, and none with the others. The flat ones are left in flats_.
 bool WallContactList::find_lone(const WallSet& walls, const Record& position, double travel, std::span<const std::uint32_t> elements) {
   const Vec3 centre = position.vector();
-  const auto way = [&](std::uint32_t element) { return travel * walls.travel_ratio(walls.wall_of(element), position.w); };
   flats_.clear();
   for (const auto element : elements)
-    if (walls.is_plane(element) || walls.holds_foot(element, centre, way(element))) flats_.push_back(element);
+    if (walls.is_plane(element) || walls.holds_foot(element, centre, travel)) flats_.push_back(element);
   for (std::size_t a = 0; a < flats_.size(); ++a)
     for (std::size_t b = a + 1; b < flats_.size(); ++b) {
       const auto wall_a = walls.wall_of(flats_[a]), wall_b = walls.wall_of(flats_[b]);
@@ -93,7 +92,7 @@ bool WallContactList::find_lone(const WallSet& walls, const Record& position, do
   for (const auto element : elements) {
     if (std::find(flats_.begin(), flats_.end(), element) != flats_.end()) continue;
     const bool yields = std::any_of(flats_.begin(), flats_.end(), [&](std::uint32_t flat) {
-      return walls.is_facet(flat) && walls.yields_to(element, flat, centre, way(element));
+      return walls.is_facet(flat) && walls.yields_to(element, flat, centre, travel);
     });
     if (!yields) return false;
   }

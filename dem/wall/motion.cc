@@ -14,7 +14,7 @@ struct Value {
 
 // Distance and speed `since` the start of a motion that speeds up evenly to 1 over `ramp`.
 Value sped_up(double since, double ramp) {
-  if (!(since > 0)) return {0, 0};
+  if (since < 0) return {0, 0};
   if (since < ramp) return {0.5 * since * since / ramp, since / ramp};
   return {since - 0.5 * ramp, 1};
 }

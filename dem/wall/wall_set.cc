@@ -555,7 +555,7 @@ Vec3 WallSet::spin_of(std::uint32_t element) const {
   return inertia.inverse() * moment;
 }
 
-void WallSet::mark(const Vec3& low, const Vec3& high) {
+void WallSet::mark(const Vec3& low, const Vec3& high, double largest_radius) {
   for (const auto w : movers_) {
     const auto& motion = walls_[w].motion;
     if (deforms(w)) {
@@ -575,6 +575,7 @@ void WallSet::mark(const Vec3& low, const Vec3& high) {
       for (int corner = 0; corner < 8; ++corner)
         mark.reach = std::max(mark.reach, from_axis(motion, Vec3(corner & 1 ? low[0] : high[0], corner & 2 ? low[1] : high[1],
                                                                  corner & 4 ? low[2] : high[2]) - mark.displacement));
+    mark.reach += largest_radius;
   }
 }
 

@@ -113,7 +113,8 @@ class WallSet {
 
   /// Lists of contacts are made now.
   /// @param low, high  box that holds all particles' centres [m]: how far a plane that turns can matter
-  void mark(const Vec3& low, const Vec3& high);
+  /// @param largest_radius  of the particles [m]
+  void mark(const Vec3& low, const Vec3& high, double largest_radius);
   /// Bound of how far any point of any wall that particles in the marked box may touch has moved since mark() [m].
   double travel_since_mark() const;
 
@@ -169,11 +170,6 @@ class WallSet {
   Record to_world(std::size_t wall, const Record& flat) const;
   /// Barycentric weights of the foot of a point in body axes on a facet of a wall that does not deform; negative beyond an edge.
   std::array<double, 3> foot_weights(std::uint32_t facet, const Vec3& body) const;
-  /// How far a particle that touches a wall moves in the wall's body axes while travel_since_mark() grows by 1: on a mesh that turns it is
-  /// by its radius farther from the axis than the wall's own points.
-  double travel_ratio(std::size_t wall, double radius) const {
-    return frames_[wall].turns && !walls_[wall].is_plane ? 1 + radius / extent_[wall] : 1;
-  }
   /// The foot of `centre` lies inside the facet, and does so wherever the centre moves by `travel`. Never for walls that deform.
   bool holds_foot(std::uint32_t facet, const Vec3& centre, double travel) const;
   /// The nearest point of `facet` lies on an edge or vertex that it shares with `other`, and does so wherever the centre moves by

@@ -1,7 +1,7 @@
 // Particles in motion: impacts, sliding, rolling, conservation, order of convergence.
 #include <gtest/gtest.h>
 
-#include "dem/insertion.h"
+#include "dem/feeding/random.h"
 #include "dem/neighbours.h"
 #include "scenes.h"
 

@@ -1,7 +1,7 @@
 // What a user may write wrong in a DEM table, and the sentence that answers.
 #include <gtest/gtest.h>
 
-#include "dem/insertion.h"
+#include "dem/feeding/insertion.h"
 #include "scenes.h"
 
 namespace acopla::dem::test {
@@ -45,7 +45,7 @@ std::string message_for(const std::string& from, const std::string& to) {
     const auto root = io::Table::from_text(text, "case.toml");
     const auto scene = read_scene(root, "g");
     largest_step(scene, root.table("g"));
-    insert_particles(scene, WallSet(scene.walls), true);
+    insert_particles(scene, WallSet(scene.walls));
   } catch (const io::UserError& error) {
     return error.what();
   }
@@ -69,13 +69,12 @@ TEST(SceneErrors, EachIsLocatedAndSaysHowToMendIt) {
       {"diameter = 0.04", "diameter = 4", "no whole sphere fits"},
       {"solver = \"dem\"", "solver = \"dem\"\nstep = 1", "above the critical step"},
       {"solver = \"dem\"", "solver = \"dem\"\nstep_fraction = 1.5", "above the critical step"},
-      {"\"mindlin\"", "\"linear_slider\"", "mindlin belongs to hertz"},
-      {"normal = \"hertz\"", "normal = \"linear\"", "needs its stiffness"},
+      {"\"mindlin\"", "\"linear_slider\"", "hertz goes with none, mindlin"},
+      {"normal = \"hertz\"", "normal = \"linear\"", "needs exactly one of stiffness"},
       {"shear_modulus = 5e6\n", "", "needs shear_modulus"},
       {"plane = { point = [0, 0, 0], normal = [0, 0, 1] }", "mesh = \"missing.stl\"", "does not exist"},
       {"normal = [0, 0, 1]", "normal = [0, 0, 0]", "has no length"},
-      {"restitution = 0.3", "restitution = 0", "outside (0, 1]"},
-      {"dimension = 3", "dimension = 2", "three dimensions"}};
+      {"restitution = 0.3", "restitution = 0", "outside (0, 1]"}};
   for (const auto& [from, to, expected] : mistakes) {
     const auto message = message_for(from, to);
     EXPECT_NE(message.find(expected), std::string::npos) << to << "\n→ " << message;
@@ -85,9 +84,9 @@ TEST(SceneErrors, EachIsLocatedAndSaysHowToMendIt) {
 
 TEST(Insertion, SpheresAreInsideTheRegionAndDoNotOverlap) {
   auto scene = read_scene(io::Table::from_text(good, "case.toml"), "g");
-  scene.insertions[0].count = 500;
-  scene.insertions[0].radius = 0.03;
-  const auto particles = insert_particles(scene, WallSet(scene.walls), true);
+  scene.fillings[0].count = 500;
+  scene.fillings[0].sizes = SizeDistribution::one(0.06, 3);
+  const auto particles = insert_particles(scene, WallSet(scene.walls));
   ASSERT_EQ(particles.size(), 500u);
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const Vec3 x = particles.position[i].vector();
@@ -100,10 +99,10 @@ TEST(Insertion, SpheresAreInsideTheRegionAndDoNotOverlap) {
 TEST(Insertion, SeedDecidesThePlaces) {
   auto scene = read_scene(io::Table::from_text(good, "case.toml"), "g");
   const WallSet walls(scene.walls);
-  const auto first = insert_particles(scene, walls, true), again = insert_particles(scene, walls, true);
+  const auto first = insert_particles(scene, walls), again = insert_particles(scene, walls);
   EXPECT_EQ(first.position[7].vector(), again.position[7].vector());
   scene.seed = 2;
-  EXPECT_NE(first.position[7].vector(), insert_particles(scene, walls, true).position[7].vector());
+  EXPECT_NE(first.position[7].vector(), insert_particles(scene, walls).position[7].vector());
 }
 
 TEST(SceneSet, SmoothSpheresStoreNoRotationAndNoHistory) {
@@ -111,7 +110,7 @@ TEST(SceneSet, SmoothSpheresStoreNoRotationAndNoHistory) {
   smooth.tangential = "none";
   const auto without = engine_with(scene_of(smooth), {{Vec3::Zero()}})->costs();
   const auto with = engine_with(scene_of(hertz_mindlin), {{Vec3::Zero()}})->costs();
-  EXPECT_EQ(with.bytes_per_particle - without.bytes_per_particle, 3 * sizeof(Record));
+  EXPECT_EQ(with.bytes_per_particle - without.bytes_per_particle, 2 * sizeof(Record)  /* spin and torque */);
   EXPECT_EQ(with.bytes_per_contact - without.bytes_per_contact, 32u);
 }
 

@@ -26,7 +26,13 @@ inline Laws with_rolling(Laws laws, double rolling_friction) {
   return laws;
 }
 
-/// A scene of those laws, without walls and gravity, and one insertion that only names the size.
+inline Laws with_elastic_plastic(Laws laws, double rolling_friction) {
+  laws.rolling = "elastic_plastic";
+  laws.rolling_friction = rolling_friction;
+  return laws;
+}
+
+/// A scene of those laws, without walls and gravity, and one filling that only names the size.
 inline Scene scene_of(const Laws& laws) {
   std::string text = fmt::format(R"(
 dimension = 3

@@ -84,7 +84,7 @@ void expect_lists_do_not_matter() {
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::vector<Body> bodies;
   for (int k = 0; k < 40; ++k) {
-    const Vec3 at(0.08 * uniform(random), 0.08 * uniform(random), radius + 0.03 + 0.01 * uniform(random));
+    const Vec3 at(0.08 * uniform(random), 0.08 * uniform(random), radius + 0.017 + 0.004 * uniform(random));
     bodies.push_back({at, {0.5 * uniform(random), 0.5 * uniform(random), -0.5}, {20 * uniform(random), 20 * uniform(random), 20 * uniform(random)}});
   }
   const auto ground = terrain(0.2, 12, [](double x, double y) { return 0.015 * std::sin(25 * x) * std::cos(31 * y); });
@@ -93,18 +93,20 @@ void expect_lists_do_not_matter() {
   };
   Drop rare = drop(), often = drop();
   const double step = 1e-5;
-  for (int window = 0; window < 150; ++window) {
+  std::size_t most = 0;
+  for (int window = 0; window < 300; ++window) {
     rare.advance(10, step);
     often.advance(10, step);
+    most = std::max(most, rare.contacts.contact_count());
     often.reverse();
     for (std::uint32_t i = 0; i < bodies.size(); ++i) {
       const auto j = static_cast<std::size_t>(std::find(often.particles.id.begin(), often.particles.id.end(), rare.particles.id[i]) - often.particles.id.begin());
-      ASSERT_LT((rare.at(i) - often.at(j)).norm(), 1e-13) << window << " " << i;  // round-off of 1500 steps
+      ASSERT_LT((rare.at(i) - often.at(j)).norm(), 1e-13) << window << " " << i;  // round-off of 3000 steps
       ASSERT_LT((rare.particles.spin_of(i) - often.particles.spin_of(j)).norm(), 1e-8);
     }
   }
-  EXPECT_GT(rare.contacts.contact_count(), 10u);
-  EXPECT_LT(rare.rebuilds, 100);
+  EXPECT_GT(most, 8u);
+  EXPECT_LT(rare.rebuilds, 300);
 }
 TEST(WallContactList, HistoriesSurviveNewListsAndSorting) { expect_lists_do_not_matter<HertzMindlin>(); }
 TEST(WallContactList, HistoriesOfOtherSizesDoTheSame) { expect_lists_do_not_matter<RollingSlider>(); }
@@ -119,15 +121,15 @@ TEST(WallContactList, HistoryIsCarriedAcrossEdges) {
     Drop on_mesh(3, table_of<HertzMindlin, 3>(glass()), {triangulated_floor(0.2, 40)}, ball, gravity, skin);
     const double step = 2e-5;
     double sticking = 0;
-    for (int window = 0; window < 100; ++window) {
+    for (int window = 0; window < 200; ++window) {
       const auto expected = on_plane.advance(50, step), load = on_mesh.advance(50, step);
       EXPECT_LT((on_plane.at() - on_mesh.at()).norm(), 1e-13);
       EXPECT_LT((expected.walls[0].force - load.walls[0].force).norm(), 1e-10 * ball_mass * 9.81);
-      EXPECT_LT((expected.walls[0].torque - load.walls[0].torque - (on_mesh.walls.reference(0)).cross(load.walls[0].force) * -1).norm(),
-                1e-10 * ball_mass * 9.81);
+      const Vec3 torque = load.walls[0].torque + on_mesh.walls.reference(0).cross(load.walls[0].force);  // the plane's is about the origin
+      EXPECT_LT((expected.walls[0].torque - torque).norm(), 1e-10 * ball_mass * 9.81);
       sticking += load.walls[0].force.head<2>().norm();
     }
-    EXPECT_GT(sticking / 100, 0.05 * ball_mass * 9.81);  // there was something to lose
+    EXPECT_GT(sticking / 200, 0.05 * ball_mass * 9.81);  // there was something to lose
     EXPECT_GT(on_mesh.at()[0], 0.03);  // across eight columns of triangles
   }
 }
@@ -170,17 +172,41 @@ TEST(MovingWall, ForcesDependOnRelativeMotionOnly) {
   }
 }
 
-TEST(TurningWall, BallAtRestOnATurntableGoesRoundWithIt) {
-  // Held by friction at distance R from the axis, the ball needs the force m ω² R inwards; on a plane and on facets that pass under it.
+TEST(TurningWall, BallThatTurnsWithTheTableFeelsNoFriction) {
   for (const auto& table : {plane(Vec3::Zero(), Vec3::UnitZ()), triangulated_floor(0.2, 9)}) {
     const double speed = 2, arm = 0.06;
-    Drop drop(3, table_of<HertzMindlin, 3>(glass()), {moved(table, Motion::rotation(Vec3::Zero(), Vec3::UnitZ(), speed))},
-              {{{arm, 0, radius - 1e-5}, {0, arm * speed, 0}, {0, 0, speed}}}, {0, 0, -9.81});
-    const auto load = drop.advance(1, 1e-6);
-    EXPECT_EQ(drop.force().head<2>().norm(), load.walls[0].force.head<2>().norm() * 0 + drop.force().head<2>().norm());
-    // No slip and no relative spin at the start: after one step of 1e-6 s the tangential force is that of a slip of ω² R Δt over it.
-    const double stiffness = 8 * glass().shear_modulus * std::sqrt(radius * 1e-5);
-    EXPECT_LT(drop.force().head<2>().norm(), 3 * stiffness * speed * speed * arm * 1e-12 + 1e-3 * 0.3 * std::sqrt(ball_mass * stiffness) * 1e-3);
+    Drop drop(3, table_of<RollingHertzMindlin, 3>(glass()), {moved(table, Motion::rotation(Vec3::Zero(), Vec3::UnitZ(), speed))},
+              {{{arm, 0, radius - 1e-5}, {0, arm * speed, 0}, {0, 0, speed}}, {{0, arm, radius - 1e-5}}});
+    drop.start(1e-5);
+    EXPECT_LT(drop.force(0).head<2>().norm(), 1e-15 * drop.force(0)[2]);
+    EXPECT_LT(drop.torque(0).norm(), 1e-15 * radius * drop.force(0)[2]);
+    EXPECT_LT(drop.force(1)[0], -0.01 * drop.force(1)[2]);  // the one at rest is dragged along
+    EXPECT_LT(std::abs(drop.force(1)[1]), 1e-15 * drop.force(1)[2]);
+    EXPECT_GT(drop.torque(1)[2], 0);  // and turned
+  }
+}
+
+TEST(TurningWall, BallOnATurntableRollsInCircles) {
+  // A ball that rolls without slip on a table turning at Ω has dv/dt = κ Ω × v, κ = I/(I + m a²) with the arm a of the contact: 2/7 for a
+  // rigid sphere (Earnshaw 1844). The friction that this takes strains the tangential spring by m κ Ω v / k_t = 2e-7 m, and the first
+  // steps set it swinging by as much; the circle has a radius of 0.044 m.
+  const auto pair = glass();
+  const double overlap = std::pow(ball_mass * 9.81 / (4.0 / 3.0 * pair.modulus * std::sqrt(radius)), 2.0 / 3.0), arm = radius - overlap;
+  const double speed = 4, kappa = 0.4 * radius * radius / (0.4 * radius * radius + arm * arm);
+  for (const auto& table : {plane(Vec3::Zero(), Vec3::UnitZ()), triangulated_floor(0.2, 15)}) {
+    const Vec3 at(0.02, -0.03, arm), velocity(0.05, 0, 0), slip = velocity - speed * Vec3::UnitZ().cross(at);
+    Drop drop(3, table_of<HertzMindlin, 3>(pair), {moved(table, Motion::rotation(Vec3::Zero(), Vec3::UnitZ(), speed))},
+              {{at, velocity, Vec3(-slip[1], slip[0], 0) / arm}}, {0, 0, -9.81}, 0.2 * radius);
+    const Vec3 centre = at + Vec3::UnitZ().cross(velocity) / (kappa * speed);
+    double worst = 0;
+    for (int window = 0; window < 200; ++window) {
+      drop.advance(100, 5e-5);
+      const Vec3 expected = centre + Eigen::AngleAxisd(kappa * speed * drop.time, Vec3::UnitZ()) * (at - centre);
+      worst = std::max(worst, (drop.at() - expected).norm());
+    }
+    EXPECT_LT(worst, 1e-6);
+    EXPECT_GT((drop.at() - at).norm(), 0.04);
+    EXPECT_GT(drop.rebuilds, 50);
   }
 }
 
@@ -195,8 +221,8 @@ TEST(MovingWall, AnElasticBallGainsTheWorkOfTheWall) {
     const auto load = drop.advance(8000, step);
     EXPECT_NEAR(drop.particles.velocity_of(0)[2], 2 * speed, 2 * speed * 1e-6);  // of the integrator, second order in the step
     // The trapezoidal sum of forces is what velocity Verlet adds to the momentum.
-    EXPECT_NEAR(-load.walls[0].force[2] * drop.time, ball_mass * drop.particles.velocity_of(0)[2], 1e-13 * ball_mass * speed);
-    EXPECT_NEAR(load.walls[0].power * drop.time, -load.walls[0].force[2] * drop.time * speed, 1e-13 * ball_mass * speed * speed);
+    EXPECT_NEAR(-load.walls[0].force[2] * drop.time, ball_mass * drop.particles.velocity_of(0)[2], 1e-12 * ball_mass * speed);
+    EXPECT_NEAR(load.walls[0].power * drop.time, -load.walls[0].force[2] * drop.time * speed, 1e-12 * ball_mass * speed * speed);
     EXPECT_EQ(drop.contacts.contact_count(), 0u);
   }
 }

@@ -141,7 +141,7 @@ class Drop {
     SavedWallHistories saved;
     contacts.collect(particles, saved);
     saved.sort();
-    walls.mark(Vec3::Constant(-1), Vec3::Constant(1));
+    walls.mark(Vec3::Constant(-1), Vec3::Constant(1), radius);
     contacts.find(kernels_, walls, particles, 0, static_cast<std::uint32_t>(particles.size()), skin_);
     contacts.restore(walls, particles, saved);
     reference_ = particles.position;
@@ -156,7 +156,7 @@ class Drop {
     particles.reorder(order);
     std::reverse(acceleration_.begin(), acceleration_.end());
     std::reverse(turning_.begin(), turning_.end());
-    walls.mark(Vec3::Constant(-1), Vec3::Constant(1));
+    walls.mark(Vec3::Constant(-1), Vec3::Constant(1), radius);
     contacts.find(kernels_, walls, particles, 0, static_cast<std::uint32_t>(particles.size()), skin_);
     contacts.restore(walls, particles, saved);
     reference_ = particles.position;
@@ -217,7 +217,18 @@ class Drop {
     if (particles.kind.dimension == 2) return {0, 0, particles.force[i].z};
     return particles.kind.rotates ? particles.torque[i].vector() : Vec3(Vec3::Zero());
   }
-  double skin() const { return skin_; }
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("particles", particles);
+    archive("walls", walls);
+    archive("contacts", contacts);
+    archive("sum", sum);
+    archive("time", time);
+    archive("rebuilds", rebuilds);
+    archive("acceleration", acceleration_);
+    archive("turning", turning_);
+    archive("reference", reference_);
+  }
   const KernelTable& kernels() const { return kernels_; }
 
  private:

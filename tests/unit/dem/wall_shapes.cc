@@ -90,9 +90,9 @@ TEST(SplitLine, PullsAndPushesLikeThePlane) {
     const std::vector<Body> disc{{{-0.15, radius + 0.001, 0}, {0.6, 0, 0}, {0, 0, -5}}};
     const Vec3 gravity(0, -9.81, 0);
     Drop on_plane(2, kernels(), {plane(Vec3::Zero(), Vec3::UnitY())}, disc, gravity), on_line(2, kernels(), {split_line(0.2, 24)}, disc, gravity);
-    const double step = 0.05 * std::sqrt(disc_mass / 1e4);
+    const double step = 0.01 * std::sqrt(disc_mass / 1e4);
     double last = 0;
-    for (int window = 0; window < 60; ++window) {
+    for (int window = 0; window < 40; ++window) {
       const auto expected = on_plane.advance(100, step), load = on_line.advance(100, step);
       EXPECT_LT((on_line.at() - on_plane.at()).norm(), 1e-12 * 0.2);
       EXPECT_LT((on_line.particles.velocity_of(0) - on_plane.particles.velocity_of(0)).norm(), 1e-12);
@@ -100,7 +100,7 @@ TEST(SplitLine, PullsAndPushesLikeThePlane) {
       EXPECT_LT((load.walls[0].force - expected.walls[0].force).norm(), 1e-12 * 30 * disc_mass * 9.81);  // force of the impact
       last = on_line.at()[0];
     }
-    EXPECT_GT(last, -0.05);
+    EXPECT_GT(last, -0.1);
     EXPECT_GT(on_line.rebuilds, 20);
   }
 }
@@ -168,14 +168,14 @@ TEST(GluedLine, HasAParticleAtEveryVertexAndAsManyBetweenAsFit) {
 TEST(GluedLine, ADiscOverAGluedParticleMeetsADiscOfItsSize) {
   const WallSet set({glued(line({{0, 0, 0}, {0.1, 0, 0}}), 0.004)});
   std::vector<std::uint32_t> near;
-  const Vec3 centre(0.041, 0.0118, 0);  // between the discs at 0.04 and 0.044
+  const Vec3 centre(0.041, 0.0115, 0);  // between the discs at 0.04 and 0.044
   set.find_near(centre, radius, near);
   ASSERT_EQ(near.size(), 2u);
   NearestPoint contact;
   ASSERT_TRUE(set.touches(near[0], centre, radius, contact));
   EXPECT_TRUE(set.is_ball(near[0]));
   EXPECT_EQ(set.curvature(near[0]), 500);
-  EXPECT_NEAR(contact.distance, std::hypot(0.001, 0.0118) - 0.002, 1e-17);
+  EXPECT_NEAR(contact.distance, std::hypot(0.001, 0.0115) - 0.002, 1e-17);
   EXPECT_LT((contact.point - (Vec3(0.04, 0, 0) + 0.002 * contact.normal)).norm(), 1e-16);
 }
 
