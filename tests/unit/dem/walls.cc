@@ -17,8 +17,8 @@ TEST(TriangleWall, BallOnATriangulatedFloorDoesNotFeelTheEdges) {
     const auto on_mesh = engine_with(scene, balls, {triangulated_floor(0.4, 10)});
     const double step = 0.2 * critical_step(scene).seconds;
     for (int window = 0; window < 40; ++window) {
-      on_plane->advance(100, step);
-      on_mesh->advance(100, step);
+      on_plane->advance(laws.normal == hertz_mindlin.normal ? 100 : 200, step);  // the spring's step is the shorter
+      on_mesh->advance(laws.normal == hertz_mindlin.normal ? 100 : 200, step);
       EXPECT_LT((position(*on_plane) - position(*on_mesh)).norm(), 1e-12);
       EXPECT_LT((velocity(*on_plane) - velocity(*on_mesh)).norm(), 1e-11);
       EXPECT_LT((spin(*on_plane) - spin(*on_mesh)).norm(), 1e-9);
