@@ -221,7 +221,7 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
   saved_pairs_.settle(place_, kernels_, particles_.size());
   const auto count = static_cast<std::uint32_t>(particles_.size());
   const auto parts = static_cast<std::uint32_t>(partitions_.size());
-  walls_.mark(domain_.low, domain_.high);
+  walls_.mark(domain_.low, domain_.high, largest_);
   team_.run(parts, [&](unsigned p) {
     auto& partition = partitions_[p];
     partition.first = static_cast<std::uint32_t>(std::uint64_t{count} * p / parts);

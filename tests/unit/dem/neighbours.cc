@@ -10,7 +10,7 @@
 #include <numeric>
 #include <thread>
 
-#include "dem/insertion.h"
+#include "dem/feeding/random.h"
 
 namespace acopla::dem::test {
 namespace {
