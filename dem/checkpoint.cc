@@ -26,12 +26,14 @@ std::string description(const Scene& scene) {
 // The head of a state, which a run with other walls and laws can read too.
 struct Head {
   int dimension = 3;
+  bool rotates = true;
   std::vector<std::string> materials;
   Particles particles;
 
   template <class Archive>
   void state(Archive& archive) {
     archive("dimension", dimension);
+    archive("rotates", rotates);
     archive("materials", materials);
     archive("particles", particles);
   }
@@ -50,6 +52,7 @@ io::State read_file(const Scene& scene, io::CheckpointInfo& info) {
 void write_checkpoint(const std::string& path, const Scene& scene, const Engine& engine, const Traffic& traffic) {
   Head head;
   head.dimension = scene.dimension;
+  head.rotates = scene.rotates();
   for (const auto& material : scene.materials) head.materials.push_back(material.name);
   head.particles = engine.particles();
   io::State state;
@@ -71,14 +74,15 @@ Particles read_particles(const Scene& scene) {
                             scene.dimension));
   Particles particles;
   particles.kind = scene.kind();
-  const auto& old = head.particles;
+  auto& old = head.particles;
+  old.kind = {head.dimension, head.rotates};
   for (std::size_t i = 0; i < old.size(); ++i) {
     const auto& name = head.materials[old.material[i]];
     const auto found = std::find_if(scene.materials.begin(), scene.materials.end(), [&](const Material& m) { return m.name == name; });
     if (found == scene.materials.end())
       fail(scene, fmt::format("start_from = \"{}\" holds particles of {}, which is not in {}.material. Add it.", scene.start_from->file, name, scene.name));
     particles.add(old.position[i].vector(), old.radius_of(i), found->density, static_cast<std::uint8_t>(found - scene.materials.begin()),
-                  old.velocity_of(i), old.kind.rotates ? old.spin_of(i) : Vec3::Zero());
+                  old.velocity_of(i), old.spin_of(i));
     particles.id.back() = old.id[i];
   }
   particles.next_id = std::max(particles.next_id, old.next_id);

@@ -308,11 +308,20 @@ class Reader {
     pair.rolling_values = contact.rolling;
     // 2 sqrt(5/6) β; in units of the impact α = 2 sqrt(5/6) β sqrt(3/2), because S_n = (3/2) k sqrt(δ).
     const double printed = printed_damping_ratio(contact.restitution);
-    if (pair.laws.normal == Hertz::name)
+    if (!linear)
       pair.hertz_damping = contact.printed_formula ? 2 * std::sqrt(5.0 / 6.0) * printed : dashpot(hertz_impact, contact.restitution) / std::sqrt(1.5);
     pair.damping_ratio = contact.printed_formula ? printed : dashpot(linear_impact, contact.restitution) / 2;
     if (linear) pair.stiffness = stiffness(pair.modulus, i, j, contact);
+    else if (pair.laws.normal != Hertz::name) pair.stiffness = slope(pair, i, j);
     return pair;
+  }
+
+  // Of a user's normal law, for the step: at an overlap of 5 % of the smaller radius.
+  double slope(const PairProperties& pair, std::size_t i, std::size_t j) const {
+    const double a = scene_.smallest_radius(i), b = scene_.smallest_radius(j);
+    const double radius = a > 0 && b > 0 ? a * b / (a + b) : std::max(a, b), smaller = a > 0 && b > 0 ? std::min(a, b) : std::max(a, b);
+    const double mass = scene_.materials[a > 0 ? i : j].density * volume_of(scene_.dimension, smaller);
+    return scene_.laws->make(pair, scene_.dimension)->stiffness(0.05 * smaller, radius, mass, mass * radius * radius).normal;
   }
 
   // The same restitution is usual for all pairs: invert once.
