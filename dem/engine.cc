@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <stdexcept>
 
@@ -53,6 +54,7 @@ void Engine::set_sizes() {
     smallest_ = std::min(smallest_, p.w);
     largest_ = std::max(largest_, p.w);
   }
+  one_material_ = std::adjacent_find(particles_.material.begin(), particles_.material.end(), std::not_equal_to<>()) == particles_.material.end();
   if (before != smallest_) {
     skin_ = 0.3 * smallest_;
     near_skin_ = 0.01 * smallest_;
@@ -247,7 +249,7 @@ void Engine::refresh(const SavedPairs* saved) {
   }
   team_.run(static_cast<unsigned>(partitions_.size()), [&](unsigned p) {
     auto& partition = partitions_[p];
-    partition.pairs.refresh(particles_, partition.rows, partition.first, partition.last, near_skin_, kernels_, saved);
+    partition.pairs.refresh(particles_, partition.rows, partition.first, partition.last, near_skin_, kernels_, one_material_, saved);
   });
   near_travel_ = 0;
   steps_since_refresh_ = 0;

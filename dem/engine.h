@@ -89,7 +89,10 @@ class Engine {
     archive("steps_since_rebuild", steps_since_rebuild_);
     archive("steps_since_refresh", steps_since_refresh_);
     archive("ledger", ledger_);
-    link_exports();
+    archive("smallest", smallest_);
+    archive("largest", largest_);
+    archive("one_material", one_material_);
+    if constexpr (Archive::reading) link_exports();
   }
 
  private:
@@ -158,6 +161,7 @@ class Engine {
   bool keeps_ledger_ = false, allow_unstable_ = false;
   double drift_limit_ = 0;
   double smallest_ = 0, largest_ = 0, time_ = 0;
+  bool one_material_ = true;  // of the particles
   bool started_ = false;
   bool outdated_ = true;  // particles came or went: the lists are void
 
