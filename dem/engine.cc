@@ -107,6 +107,12 @@ void Engine::start() {
   if (keeps_ledger_) energy();
 }
 
+void Engine::restart_clock() {
+  time_ = 0;
+  ledger_ = {};
+  if (keeps_ledger_ && started_) energy();
+}
+
 void Engine::move(double kick, double step) {
   team_.run(static_cast<unsigned>(partitions_.size()), [&](unsigned p) {
     auto& partition = partitions_[p];

@@ -44,6 +44,8 @@ class Engine {
   /// Takes out all particles for which `leaves` says so. @return their mass [kg]
   double remove(const std::function<bool(std::size_t)>& leaves);
   double time() const { return time_; }
+  /// Time and the energy ledger begin anew with the particles as they are.
+  void restart_clock();
 
   /// Contacts at the last step, particle–particle and particle–wall.
   std::size_t contact_count() const;

@@ -35,7 +35,8 @@ class Solver final : public protocol::Participant {
   void check_uses(const protocol::Run& run);
   std::size_t wall_of(const std::string& surface) const;
   Particles first_particles(const WallSet& walls) const;
-  Particles settled(Particles particles) const;
+  void settle(Engine& engine) const;
+  Particles settled_between_standing_walls(Particles particles) const;
   void prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received);
   void step_through(std::uint64_t steps, double step);
   void check_step(double step);

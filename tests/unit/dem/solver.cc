@@ -206,8 +206,12 @@ TEST_F(FromCheckpoint, AWholeStateGoesOnBitByBit) {
   for (int k = 0; k < 20; ++k) whole->advance(window(k), {});
   const auto continued = solver_of(from("state") + floor());
   continued->start(run_of(Vec3(0, -9.81, 0)));
+  const auto without_bound = [](std::vector<std::pair<std::string, double>> values) {  // which is looked at now and then, from the start on
+    std::erase_if(values, [](const auto& value) { return value.first == "step_ratio"; });
+    return values;
+  };
   for (int k = 0; k < 30; ++k)
-    ASSERT_EQ(whole->advance(window(20 + k), {}).quantities, continued->advance(window(20 + k), {}).quantities) << k;
+    ASSERT_EQ(without_bound(whole->advance(window(20 + k), {}).quantities), without_bound(continued->advance(window(20 + k), {}).quantities)) << k;
 }
 
 TEST_F(FromCheckpoint, ParticlesMayGoToAnotherScene) {
@@ -260,7 +264,7 @@ particles = [{ at = [0, 0, 0.005], diameter = 0.02 }]
 )");
   solver->start(run_of(Vec3::Zero()));
   try {
-    solver->advance({0, 1, 0, 1e-3}, {});
+    solver->advance({0, 17, 0, 17 * 1.7e-3}, {});  // steps of 1.7 ms
     FAIL() << "nothing was said";
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("of the bound for particle 0 at (0, 0, 0.005) m"), std::string::npos) << error.what();
