@@ -382,7 +382,7 @@ StepRatio Engine::step_ratio(double step) const {
   for (const auto& partition : partitions_)
     partition.walls.for_each_contact([&](std::uint32_t i, std::uint8_t material, std::uint8_t wall, double overlap, const Vec3& normal,
                                          double curvature) { estimate.add_wall(i, overlap, normal, curvature, kernels_.of(material, wall)); });
-  return estimate.worst();
+  return estimate.ratio();
 }
 
 void Engine::check_domain() const {

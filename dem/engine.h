@@ -49,7 +49,7 @@ class Engine {
 
   /// Contacts at the last step, particle–particle and particle–wall.
   std::size_t contact_count() const;
-  /// Δt over the limit (2/ω)(sqrt(1+ζ²) − ζ) of the worst particle (dem/stability.h), and who it is.
+  /// Δt over the stability limit of the contacts there are (StabilityEstimate::ratio), and who decides it.
   StepRatio step_ratio(double step) const;
   /// Deepest overlap over the smaller radius.
   double worst_overlap() const;

@@ -171,11 +171,14 @@ void Solver::check_step(double step) {
   checked_at_ = steps_;
   const auto ratio = engine_->step_ratio(step);
   step_ratio_ = ratio.value;
-  if (ratio.value <= 1 || scene_.allow_unstable_step) return;
+  // A hard impact may pass the limit for some steps, in which nothing can grow; who is still beyond it two hundred steps later stays there.
+  const bool again = beyond_limit_;
+  beyond_limit_ = ratio.value > 1;
+  if (!beyond_limit_ || !again || scene_.allow_unstable_step) return;
   const Vec3 x = engine_->particles().position[ratio.particle].vector();
   throw std::runtime_error(fmt::format(
-      "the step of {:.4g} s may be unstable at t = {:.6g} s: it is {:.2f} of the bound for particle {} at ({:.4g}, {:.4g}, {:.4g}) m with the contacts "
-      "it has now. Lower {}, or say allow_unstable_step = true.",
+      "the step of {:.4g} s is unstable at t = {:.6g} s: it is {:.2f} of the limit of the contacts there are now, of which those of particle {} at "
+      "({:.4g}, {:.4g}, {:.4g}) m are the stiffest. Lower {}, or say allow_unstable_step = true.",
       step, engine_->time(), ratio.value, engine_->particles().id[ratio.particle], x[0], x[1], x[2], scene_.step ? "step" : "step_fraction"));
 }
 

@@ -57,6 +57,7 @@ class Solver final : public protocol::Participant {
   double next_picture_ = 0;
   std::uint64_t steps_ = 0, checked_at_ = 0;
   double step_ratio_ = 0;
+  bool beyond_limit_ = false;  // at the last look
   std::size_t couples_lost_ = 0, triangles_dropped_ = 0;
   double seconds_ = 0;
   double last_step_ = 0, last_rate_ = 0;
