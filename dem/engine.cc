@@ -16,6 +16,7 @@ namespace {
 // One kernel for every pair of materials that can meet, and nothing for the others.
 KernelTable make_kernels(const Scene& scene) {
   KernelTable table;
+  table.laws = scene.laws;
   table.materials = scene.materials.size();
   table.group.assign(table.materials * table.materials, 0);
   table.kernel.push_back(nullptr);

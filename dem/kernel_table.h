@@ -9,8 +9,11 @@
 
 namespace acopla::dem {
 
+class Laws;
+
 /// The contact models of a scene. Pairs of materials that never meet have none.
 struct KernelTable {
+  std::shared_ptr<const Laws> laws;            ///< keeps the libraries open that the kernels come from
   std::size_t materials = 1;
   std::vector<std::uint16_t> group;            ///< [a · materials + b], symmetric
   std::vector<std::unique_ptr<Kernel>> kernel; ///< one a group; may be null

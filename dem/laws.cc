@@ -30,10 +30,23 @@ void Laws::load(const std::string& library) {
   if (!version || !add)
     throw std::runtime_error("is not a library of contact laws: it does not define ACOPLA_LAWS (see docs/laws.md)");
   if (std::string(version()) != laws_version)
-    throw std::runtime_error(fmt::format("was built for \"{}\", and this program is \"{}\". Build it again with the Acopla that runs it.",
+    throw std::runtime_error(fmt::format("was built for \"{}\", and this program is of \"{}\". Build it again with the Acopla that runs it.",
                                          version(), laws_version));
-  add(*this);
-  libraries_.push_back(std::move(handle));
+  // Into a table of its own first: a library that fails leaves nothing behind.
+  Laws added;
+  add(added);
+  if (added.combinations_.empty()) throw std::runtime_error("adds no laws: its ACOPLA_LAWS calls neither add nor add_with_rolling (see docs/laws.md)");
+  auto all = *this;
+  merge(all.normal_, added.normal_);
+  merge(all.tangential_, added.tangential_);
+  merge(all.rolling_, added.rolling_);
+  for (const auto& combination : added.combinations_) {
+    if (all.combination(combination.laws))
+      throw std::runtime_error(fmt::format("adds the combination {}, which is there already. Remove it from its ACOPLA_LAWS.", combination.laws.text()));
+    all.combinations_.push_back(combination);
+  }
+  all.libraries_.push_back(std::move(handle));
+  *this = std::move(all);
 }
 
 std::vector<LawSet> Laws::combinations() const {
@@ -61,8 +74,14 @@ std::unique_ptr<Kernel> Laws::make(const PairProperties& pair, int dimension) co
   return (dimension == 2 ? found->discs : found->spheres)(pair);
 }
 
-void Laws::remember(std::vector<LawInfo>& laws, LawInfo law) {
-  if (!find(laws, law.name)) laws.push_back(std::move(law));
+// A library may use laws that are there, as it has compiled them too, but not give their names to others.
+void Laws::merge(std::vector<LawInfo>& laws, const std::vector<LawInfo>& added) {
+  for (const auto& law : added) {
+    const auto* known = find(laws, law.name);
+    if (known && known->type != law.type)
+      throw std::runtime_error(fmt::format("adds the law {}, and the law {} is there already. Give it another name.", law.name, law.name));
+    if (!known) laws.push_back(law);
+  }
 }
 
 const LawInfo* Laws::find(const std::vector<LawInfo>& laws, const std::string& name) {

@@ -1,9 +1,12 @@
-// The laws that a case may name, and the kernels compiled for their combinations: the built-in ones and those of a user's libraries.
+// The laws that a case may name, and the kernels compiled for their combinations: the built-in ones and those of a user's libraries
+// (docs/laws.md). What a library needs of it is inline: a library of laws leaves no symbol open to the program that loads it.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string>
+#include <typeinfo>
 #include <vector>
 
 #include "dem/contact/elastic_plastic.h"
@@ -17,6 +20,7 @@ struct LawInfo {
   std::span<const Field> fields;  ///< its own numbers
   bool needs_moduli = false;      ///< elastic constants of the materials
   bool needs_friction = false;    ///< a tangential law below it (rolling laws)
+  std::string type;               ///< of its struct: two laws of one name are one law only where this agrees
 };
 
 class Laws {
@@ -28,9 +32,9 @@ class Laws {
   template <class Normal, class Tangential, class Rolling>
   void add() {
     using Model = ContactModel<Normal, Tangential, Rolling>;
-    remember(normal_, {Normal::name, Normal::fields, Normal::needs_moduli, false});
-    remember(tangential_, {Tangential::name, Tangential::fields, Tangential::needs_moduli, false});
-    remember(rolling_, {Rolling::name, Rolling::fields, false, needs_friction<Rolling>()});
+    remember(normal_, {Normal::name, Normal::fields, Normal::needs_moduli, false, typeid(Normal).name()});
+    remember(tangential_, {Tangential::name, Tangential::fields, Tangential::needs_moduli, false, typeid(Tangential).name()});
+    remember(rolling_, {Rolling::name, Rolling::fields, false, needs_friction<Rolling>(), typeid(Rolling).name()});
     combinations_.push_back({{Normal::name, Tangential::name, Rolling::name},
                              Model::rotates,
                              [](const PairProperties& pair) -> std::unique_ptr<Kernel> { return std::make_unique<KernelOf<Model, 2>>(pair); },
@@ -44,7 +48,8 @@ class Laws {
     if constexpr (!std::is_same_v<Tangential, Frictionless>) add<Normal, Tangential, ElasticPlastic>();
   }
 
-  /// Loads a library that adds its own laws. @throws std::runtime_error when it cannot be loaded or was built for another version
+  /// Loads a library that adds its own laws; all of them or none. @throws std::runtime_error when it cannot be loaded, is not a library of
+  /// laws, was built for another version, or names a law that is there already; the message continues "names X, which …"
   void load(const std::string& library);
 
   const LawInfo* normal(const std::string& name) const { return find(normal_, name); }
@@ -70,11 +75,17 @@ class Laws {
     std::unique_ptr<Kernel> (*discs)(const PairProperties&);
     std::unique_ptr<Kernel> (*spheres)(const PairProperties&);
   };
+  // A rolling law may say that its spring is built on the tangential law's.
   template <class Rolling>
   static constexpr bool needs_friction() {
-    return std::is_same_v<Rolling, ElasticPlastic>;
+    if constexpr (requires { Rolling::needs_friction; }) return Rolling::needs_friction;
+    else return false;
   }
-  static void remember(std::vector<LawInfo>& laws, LawInfo law);
+  static void remember(std::vector<LawInfo>& laws, LawInfo law) {
+    const bool known = std::any_of(laws.begin(), laws.end(), [&](const LawInfo& one) { return one.name == law.name && one.type == law.type; });
+    if (!known) laws.push_back(std::move(law));
+  }
+  static void merge(std::vector<LawInfo>& laws, const std::vector<LawInfo>& added);
   static const LawInfo* find(const std::vector<LawInfo>& laws, const std::string& name);
   static std::vector<std::string> names(const std::vector<LawInfo>& laws);
   const Combination* combination(const LawSet& laws) const;
@@ -84,12 +95,13 @@ class Laws {
   std::vector<std::shared_ptr<void>> libraries_;  // open while a kernel of theirs may be called
 };
 
-/// What a library of laws was compiled against; a library of another build is refused.
-inline constexpr const char* laws_version = "acopla-laws-1 of four lanes";
+/// What a library of laws was compiled against; a library of another one is refused. Kernels share arrays of packs with the engine, so the
+/// width of a pack is part of it.
+inline constexpr const char* laws_version = lanes == 8 ? "acopla laws 2, packs of eight" : "acopla laws 2, packs of four";
 
 }  // namespace acopla::dem
 
 /// The entry of a user's library: ACOPLA_LAWS(laws) { laws.add_with_rolling<MyNormal, acopla::dem::LinearSlider>(); }
-#define ACOPLA_LAWS(laws)                                                                       \
-  extern "C" const char* acopla_laws_version() { return acopla::dem::laws_version; }           \
-  extern "C" void acopla_add_laws(acopla::dem::Laws& laws)
+#define ACOPLA_LAWS(laws)                                                                                                           \
+  extern "C" __attribute__((visibility("default"))) const char* acopla_laws_version() { return acopla::dem::laws_version; }          \
+  extern "C" __attribute__((visibility("default"))) void acopla_add_laws(acopla::dem::Laws& laws)

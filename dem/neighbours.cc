@@ -59,12 +59,6 @@ void sort_by_key(std::vector<Keyed>& items, std::vector<Keyed>& scratch) {
   }
 }
 
-}  // namespace
-
-// --- building
-
-namespace {
-
 // ⌈log2 x⌉ of a positive number.
 int rounded_up_log2(double x) { return static_cast<int>((std::bit_cast<std::uint64_t>(x) - 1) >> 52) - 1022; }
 
@@ -231,9 +225,7 @@ void HierarchicalGrid::make_level(std::size_t l, std::span<const Record> positio
   auto* const finer = l > 0 ? &levels_[l - 1] : nullptr;
   if (finer) {
     finer->parent.resize(finer->cells());
-    for (std::uint32_t c = 0; c < finer->cells(); ++c) {
-      entries_.push_back({number(coarser(finer->at[c], 1)), c, true});
-    }
+    for (std::uint32_t c = 0; c < finer->cells(); ++c) entries_.push_back({number(coarser(finer->at[c], 1)), c, true});
   }
   sort_by_key(entries_, entries_scratch_);
 
@@ -348,18 +340,17 @@ namespace {
 using Indices = std::uint32_t __attribute__((vector_size(4 * lanes)));
 
 // Sorts eight numbers: Batcher's odd-even merge sort as six rounds of comparing each lane with another.
-Indices sorted(Indices v) {
-  const auto round = [&v](const Indices& partner, const Indices& keeps_larger) {
+void sort_lanes(Indices& v) {
+  const auto compare = [&v](const Indices& partner, const Indices& keeps_larger) {
     const Indices other = __builtin_shuffle(v, partner);
     v = static_cast<Indices>(v > other) == -keeps_larger ? v : other;
   };
-  round(Indices{1, 0, 3, 2, 5, 4, 7, 6}, Indices{0, 1, 0, 1, 0, 1, 0, 1});
-  round(Indices{2, 3, 0, 1, 6, 7, 4, 5}, Indices{0, 0, 1, 1, 0, 0, 1, 1});
-  round(Indices{0, 2, 1, 3, 4, 6, 5, 7}, Indices{0, 0, 1, 0, 0, 0, 1, 0});
-  round(Indices{4, 5, 6, 7, 0, 1, 2, 3}, Indices{0, 0, 0, 0, 1, 1, 1, 1});
-  round(Indices{0, 1, 4, 5, 2, 3, 6, 7}, Indices{0, 0, 0, 0, 1, 1, 0, 0});
-  round(Indices{0, 2, 1, 4, 3, 6, 5, 7}, Indices{0, 0, 1, 0, 1, 0, 1, 0});
-  return v;
+  compare(Indices{1, 0, 3, 2, 5, 4, 7, 6}, Indices{0, 1, 0, 1, 0, 1, 0, 1});
+  compare(Indices{2, 3, 0, 1, 6, 7, 4, 5}, Indices{0, 0, 1, 1, 0, 0, 1, 1});
+  compare(Indices{0, 2, 1, 3, 4, 6, 5, 7}, Indices{0, 0, 1, 0, 0, 0, 1, 0});
+  compare(Indices{4, 5, 6, 7, 0, 1, 2, 3}, Indices{0, 0, 0, 0, 1, 1, 1, 1});
+  compare(Indices{0, 1, 4, 5, 2, 3, 6, 7}, Indices{0, 0, 0, 0, 1, 1, 0, 0});
+  compare(Indices{0, 2, 1, 4, 3, 6, 5, 7}, Indices{0, 0, 1, 0, 1, 0, 1, 0});
 }
 
 // Sorts a row that may be followed by `lanes` numbers that do not matter. Most rows are short: those without a branch.
@@ -372,11 +363,12 @@ void sort_row(std::uint32_t* begin, std::uint32_t* end) {
   constexpr Indices place{0, 1, 2, 3, 4, 5, 6, 7};
   Indices row;
   std::memcpy(&row, begin, sizeof row);
-  row = sorted(place < count ? row : ~Indices{});
+  row = place < count ? row : ~Indices{};
+  sort_lanes(row);
   std::memcpy(begin, &row, sizeof row);
 }
 
-#if defined(__AVX2__) && !defined(__AVX512VL__)
+#ifdef __AVX2__
 // Lanes in which a mask of eight bits is set, first to last.
 constexpr auto set_lanes = [] {
   std::array<std::array<std::uint8_t, lanes>, 256> table{};
@@ -399,21 +391,7 @@ struct HierarchicalGrid::Search {
 
   // Appends the partners among slots [begin, end) at `out`, where there is room for all of them and `lanes` more.
   [[gnu::always_inline]] inline std::uint32_t* test(std::uint32_t begin, std::uint32_t end, std::uint32_t* out) const {
-#if defined(__AVX512VL__)
-    const auto px8 = _mm512_set1_pd(px), py8 = _mm512_set1_pd(py), pz8 = _mm512_set1_pd(pz), reach8 = _mm512_set1_pd(reach);
-    const auto i8 = _mm256_set1_epi32(static_cast<int>(i));
-    for (auto s = begin; s < end; s += lanes) {
-      const auto valid = static_cast<__mmask8>(end - s >= lanes ? 255u : (1u << (end - s)) - 1);
-      const auto partner = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(index + s));
-      const auto dx = _mm512_sub_pd(px8, _mm512_loadu_pd(x + s)), dy = _mm512_sub_pd(py8, _mm512_loadu_pd(y + s));
-      const auto dz = _mm512_sub_pd(pz8, _mm512_loadu_pd(z + s)), sum = _mm512_add_pd(reach8, _mm512_loadu_pd(w + s));
-      const auto square = _mm512_fmadd_pd(dz, dz, _mm512_fmadd_pd(dy, dy, _mm512_mul_pd(dx, dx)));
-      const auto later = _mm256_mask_cmpgt_epu32_mask(valid, partner, i8);
-      const auto near = _mm512_mask_cmp_pd_mask(later, square, _mm512_mul_pd(sum, sum), _CMP_LT_OQ);
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm256_maskz_compress_epi32(near, partner));
-      out += std::popcount(static_cast<unsigned>(near));
-    }
-#elif defined(__AVX2__)
+#ifdef __AVX2__
     const auto px4 = _mm256_set1_pd(px), py4 = _mm256_set1_pd(py), pz4 = _mm256_set1_pd(pz), reach4 = _mm256_set1_pd(reach);
     const auto near_four = [&](std::uint32_t s) {
       const auto dx = _mm256_sub_pd(px4, _mm256_loadu_pd(x + s)), dy = _mm256_sub_pd(py4, _mm256_loadu_pd(y + s));
@@ -468,7 +446,7 @@ void HierarchicalGrid::find_pairs(std::uint32_t first, std::uint32_t last, PairL
     for (auto i = first; i < last; ++i) {
       const auto begin = found;
       found = search(i, begin);
-      sort_row(room(rows, begin, 0), rows.second.data() + found);
+      sort_row(rows.second.data() + begin, rows.second.data() + found);
       rows.start[i - first + 1] = found;
     }
   };
@@ -556,19 +534,20 @@ struct HierarchicalGrid::Climb {
       }
       if (chord <= 0) continue;
       const double half = std::sqrt(chord);
-      const auto* const cells = finer.at.data();
-      from = static_cast<std::uint32_t>(first_not(cells + from, cells + to, [&](const Coordinates& c) { return (c[0] + 1) * finer.size <= at[0] - half; }) - cells);
-      to = static_cast<std::uint32_t>(first_not(cells + from, cells + to, [&](const Coordinates& c) { return c[0] * finer.size < at[0] + half; }) - cells);
+      from = first_cell(finer, from, to, [&](double x) { return x + finer.size <= at[0] - half; });
+      to = first_cell(finer, from, to, [&](double x) { return x < at[0] + half; });
       if (from == to) continue;
       if (finer.first[from] < finer.first[to]) test(finer.first[from], finer.first[to]);
       if (l > 1) down(l - 1, from, to);
     }
   }
 
-  // The first element that does not fulfil a condition which a run of first elements fulfils.
-  static const Coordinates* first_not(const Coordinates* begin, const Coordinates* end, const auto& condition) {
-    if (end - begin > 8) return std::partition_point(begin, end, condition);
-    while (begin < end && condition(*begin)) ++begin;
+  // The first cell of a row whose x, in finest cells, does not fulfil a condition that cells further left fulfil.
+  static std::uint32_t first_cell(const Level& level, std::uint32_t begin, std::uint32_t end, const auto& condition) {
+    const auto holds = [&](const Coordinates& cell) { return condition(cell[0] * level.size); };
+    const auto* const cells = level.at.data();
+    if (end - begin > 8) return static_cast<std::uint32_t>(std::partition_point(cells + begin, cells + end, holds) - cells);
+    while (begin < end && holds(cells[begin])) ++begin;
     return begin;
   }
 };
@@ -634,8 +613,8 @@ void curve_order(std::span<const Record> positions, std::vector<std::uint32_t>& 
   const double longest = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
   // The longest edge of the box fills the curve's square or cube, so that its halves and quarters are the box's.
   int bits = 0;
-  while (bits < 20 && longest > std::max(2 * low.w, 0.0) * static_cast<double>(1u << bits)) ++bits;
-  const double cells = static_cast<double>(1u << bits), scale = longest > 0 ? cells * (1 - 1e-12) / longest : 0;
+  while (bits < 20 && longest > 2 * low.w * static_cast<double>(1u << bits)) ++bits;
+  const double cells = static_cast<double>(1u << bits), scale = longest > 1e-300 ? cells * (1 - 1e-12) / longest : 0;
   const int dimensions = high.z > low.z ? 3 : 2;
   struct Keyed {
     std::uint64_t key;

@@ -31,8 +31,8 @@ struct PairList {
 /// own and of coarser levels in the cells around it, and for finer ones only in cells that hold any and are near its surface,
 /// so that the largest do not set the price of the smallest. Radii within a factor of about two make one level.
 ///
-/// Cells without particles take no memory: it is bounded by some hundred bytes a particle and level, however far apart they
-/// are. In 2D all z are equal, which is seen from the positions. Everything is kept from call to call.
+/// Cells without particles take no memory where they are many: it is bounded by some hundred bytes a particle and level, however
+/// far apart they are. In 2D all z are equal, which is seen from the positions. Everything is kept from call to call.
 class HierarchicalGrid {
  public:
   /// Sorts the particles into cells. The positions are copied.
@@ -42,13 +42,15 @@ class HierarchicalGrid {
   /// @throws std::invalid_argument where a number is not finite or negative as it must not be
   void build(std::span<const Record> positions, double skin);
 
-  /// The rows of particles [first, last): every pair with |x_i − x_j| < r_i + r_j + skin as given to build(). Rows do not
-  /// depend on how they are split into ranges, nor on the thread. Reads only; several threads may call it on lists of their own.
+  /// The rows of particles [first, last), first ≤ last ≤ size(): every pair with |x_i − x_j| < r_i + r_j + skin as given to
+  /// build(). Rows do not depend on how they are split into ranges, nor on the thread. Reads only; several threads may call it,
+  /// each with a list of its own.
   void find_pairs(std::uint32_t first, std::uint32_t last, PairList& rows) const;
 
   std::size_t size() const { return home_.size(); }
   std::size_t levels() const { return level_count_; }
-  /// Cells of all levels that are kept in memory: those that hold particles, of their own level or of finer ones.
+  /// Cells kept in memory: of all levels those that hold particles, of their own level or of finer ones; or, where one level
+  /// fills at most eight cells a particle, all.
   std::size_t cells() const;
 
  private:

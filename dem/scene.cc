@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <set>
@@ -155,8 +156,46 @@ class Reader {
     std::size_t index = 0;
     for (const auto& table : table_.list("inlet")) scene_.inlets.push_back(read_inlet(table, scope, index++));
     for (const auto& table : table_.list("outlet")) scene_.outlets.push_back(read_outlet(table, scope));
-    if (scene_.fillings.empty() && scene_.inlets.empty())
-      table_.fail(fmt::format("has no particles. Add [[{}.insert]] or [[{}.inlet]].", table_.name(), table_.name()));
+    read_start();
+    if (scene_.fillings.empty() && scene_.inlets.empty() && !scene_.start_from)
+      table_.fail(fmt::format("has no particles. Add [[{}.insert]], [[{}.inlet]] or start_from.", table_.name(), table_.name()));
+  }
+
+  void read_start() {
+    if (table_.has("start_from")) {
+      StartFrom start;
+      start.where = table_.location("start_from");
+      std::string path;
+      if (table_.is_table("start_from")) {
+        const auto from = table_.table("start_from");
+        path = from.path("results");
+        start.whole = from.choice("take", {"particles", "state"}, "particles") == "state";
+      } else {
+        path = table_.path("start_from");
+      }
+      start.file = find_checkpoint(path);
+      if (!scene_.fillings.empty()) table_.fail("start_from", "and insert are both given. Keep one.");
+      scene_.start_from = start;
+    }
+    if (table_.has("settle")) {
+      const auto settle = table_.table("settle");
+      scene_.settling = Settling{settle.number("kinetic_energy", io::positive, 1e-6), settle.number("limit", io::positive), table_.location("settle")};
+      if (scene_.gravity.isZero(0)) table_.fail("settle", "needs gravity.");
+      if (scene_.start_from && scene_.start_from->whole) table_.fail("settle", "and start_from with take = \"state\" contradict each other.");
+    }
+  }
+
+  // A checkpoint, or the only one in the results of a run.
+  std::string find_checkpoint(const std::string& path) const {
+    if (!std::filesystem::is_directory(path)) return path;
+    std::vector<std::string> found;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(path))
+      if (entry.path().filename() == "checkpoint.h5") found.push_back(entry.path().string());
+    if (found.size() != 1)
+      table_.fail("start_from", fmt::format("names {}, which holds {} checkpoints. {}", path, found.empty() ? "no" : "several",
+                                            found.empty() ? "Run that case with output = { checkpoint = true }."
+                                                          : fmt::format("Name one of {}.", fmt::join(found, ", "))));
+    return found.front();
   }
 
   // A law is its name, or a table with `law` and its own numbers, which the law declares.
@@ -269,11 +308,20 @@ class Reader {
     pair.rolling_values = contact.rolling;
     // 2 sqrt(5/6) β; in units of the impact α = 2 sqrt(5/6) β sqrt(3/2), because S_n = (3/2) k sqrt(δ).
     const double printed = printed_damping_ratio(contact.restitution);
-    if (pair.laws.normal == Hertz::name)
+    if (!linear)
       pair.hertz_damping = contact.printed_formula ? 2 * std::sqrt(5.0 / 6.0) * printed : dashpot(hertz_impact, contact.restitution) / std::sqrt(1.5);
     pair.damping_ratio = contact.printed_formula ? printed : dashpot(linear_impact, contact.restitution) / 2;
     if (linear) pair.stiffness = stiffness(pair.modulus, i, j, contact);
+    else if (pair.laws.normal != Hertz::name) pair.stiffness = slope(pair, i, j);
     return pair;
+  }
+
+  // Of a user's normal law, for the step: at an overlap of 5 % of the smaller radius.
+  double slope(const PairProperties& pair, std::size_t i, std::size_t j) const {
+    const double a = scene_.smallest_radius(i), b = scene_.smallest_radius(j);
+    const double radius = a > 0 && b > 0 ? a * b / (a + b) : std::max(a, b), smaller = a > 0 && b > 0 ? std::min(a, b) : std::max(a, b);
+    const double mass = scene_.materials[a > 0 ? i : j].density * volume_of(scene_.dimension, smaller);
+    return scene_.laws->make(pair, scene_.dimension)->stiffness(0.05 * smaller, radius, mass, mass * radius * radius).normal;
   }
 
   // The same restitution is usual for all pairs: invert once.
@@ -341,6 +389,7 @@ class Reader {
     const auto output = table_.table_or_empty("output");
     scene_.write_particles = output.flag("particles", true);
     scene_.output_every = output.number("every", io::positive, 0);
+    scene_.write_checkpoint = output.flag("checkpoint", false);
   }
 
   const io::Table& root_;

@@ -27,6 +27,20 @@ struct Material {
   double young() const { return 2 * shear_modulus * (1 + poisson); }
 };
 
+/// Particles from the checkpoint of another run, in place of fillings.
+struct StartFrom {
+  std::string file;      ///< a checkpoint
+  bool whole = false;    ///< its whole state, histories and all: the same scene goes on bit by bit; else the particles alone
+  io::Location where;
+};
+
+/// Before time begins: the particles come to rest while all walls stand.
+struct Settling {
+  double kinetic_energy = 0;  ///< per particle over its weight times its radius: at rest below this
+  double limit = 0;           ///< [s]; longer than this is an error
+  io::Location where;
+};
+
 struct Scene {
   std::string name;              ///< of the participant
   int dimension = 3;             ///< 2: discs of unit depth; 3: spheres
@@ -38,6 +52,8 @@ struct Scene {
   std::vector<Filling> fillings;
   std::vector<Inlet> inlets;
   std::vector<Outlet> outlets;
+  std::optional<StartFrom> start_from;
+  std::optional<Settling> settling;
   Damping damping;
   std::uint64_t seed = 1;
   double step_fraction = 0.2;
@@ -50,6 +66,7 @@ struct Scene {
   std::optional<geometry::Box> domain;
   double output_every = 0;     ///< [s]; 0: only the end
   bool write_particles = true;
+  bool write_checkpoint = false;  ///< at the end, and with every picture
 
   const PairProperties& pair(std::size_t i, std::size_t j) const { return pairs[i * materials.size() + j]; }
   /// At the start; inlets come on top.

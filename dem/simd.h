@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "dem/particles.h"
 
@@ -82,12 +83,12 @@ inline DoublePack first_lanes(std::size_t count) {
 
 /// Lanes from memory; `at` need not be aligned.
 inline DoublePack load(const double* at) {
-  using Unaligned = double __attribute__((vector_size(8 * lanes), aligned(8), may_alias));
-  return DoublePack(*reinterpret_cast<const Unaligned*>(at));
+  DoublePack pack;
+  std::memcpy(&pack.v, at, sizeof pack.v);
+  return pack;
 }
 inline void store(double* at, const DoublePack& value) {
-  using Unaligned = double __attribute__((vector_size(8 * lanes), aligned(8), may_alias));
-  *reinterpret_cast<Unaligned*>(at) = value.v;
+  std::memcpy(at, &value.v, sizeof value.v);
 }
 
 /// A record is four aligned doubles, so it may be read and written as one vector.

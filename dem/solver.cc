@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "dem/checkpoint.h"
 #include "dem/feeding/insertion.h"
 #include "dem/step.h"
 
@@ -16,20 +17,32 @@ namespace acopla::dem {
 Solver::Solver(const io::Table& root, const std::string& name)
     : scene_(read_scene(root, name)), largest_step_(dem::largest_step(scene_, root.table(name))) {}
 
-void Solver::check_uses(const protocol::Run& run) const {
+std::size_t Solver::wall_of(const std::string& surface) const {
+  std::vector<std::string> names;
+  for (std::size_t w = 0; w < scene_.walls.size(); ++w) {
+    if (scene_.walls[w].is_plane) continue;
+    if (scene_.walls[w].name == surface) return w;
+    names.push_back(scene_.walls[w].name);
+  }
+  const auto nearest = io::nearest_word(surface, names);
+  throw io::UserError(fmt::format("{} has no wall {} with vertices.{}", scene_.name, surface,
+                                  nearest ? fmt::format(" Did you mean {}?", *nearest) : " Planes have none to couple."));
+}
+
+void Solver::check_uses(const protocol::Run& run) {
   for (const auto& use : run.uses) {
-    std::vector<std::string> meshes;
-    for (const auto& wall : scene_.walls)
-      if (!wall.is_plane) meshes.push_back(wall.name);
-    if (std::find(meshes.begin(), meshes.end(), use.surface) == meshes.end()) {
-      const auto nearest = io::nearest_word(use.surface, meshes);
-      throw io::UserError(fmt::format("{} has no mesh wall {}.{}", scene_.name, use.surface,
-                                      nearest ? fmt::format(" Did you mean {}?", *nearest) : " Planes have no vertices to couple."));
-    }
+    const auto wall = wall_of(use.surface);
     for (const auto& field : use.sends)
       if (field != "force") throw io::UserError(fmt::format("{}.{} cannot send {}: it sends force.", scene_.name, use.surface, field));
+    if (!use.sends.empty()) sent_.push_back(wall);
+    if (use.receives.empty()) continue;
     for (const auto& field : use.receives)
-      throw io::UserError(fmt::format("{}.{} cannot receive {}: its walls are at rest in this version.", scene_.name, use.surface, field));
+      if (field != "displacement" && field != "velocity")
+        throw io::UserError(fmt::format("{}.{} cannot receive {}: it receives displacement and velocity.", scene_.name, use.surface, field));
+    if (scene_.walls[wall].motion.moves())
+      throw io::UserError(fmt::format("{}.{} is moved by the coupled solver and has a motion of its own. Remove its motion.", scene_.name, use.surface));
+    scene_.walls[wall].motion = Motion::prescribed();
+    received_.push_back(wall);
   }
 }
 
@@ -37,75 +50,183 @@ std::vector<protocol::Surface> Solver::start(const protocol::Run& run) {
   run_ = run;
   check_uses(run);
   scene_.gravity = Vec3(run.gravity[0], run.gravity[1], run.gravity[2]);
-  WallSet walls(scene_.walls);
   for (const auto& wall : scene_.walls) {
     triangles_dropped_ += wall.mesh.dropped;
     if (wall.mesh.dropped)
       fmt::print(stderr, "wall {}: {} degenerate triangles were left out\n", wall.name, wall.mesh.dropped);
   }
-  auto particles = insert_particles(scene_, walls);
+  WallSet walls(scene_.walls);
+  // Forces on vertices are summed only for walls that somebody wants them of.
+  for (const auto wall : sent_) walls.send(wall);
+  auto particles = first_particles(walls);
+  if (scene_.settling) particles = settled(std::move(particles));
   std::vector<protocol::Surface> surfaces;
-  for (const auto& use : run.uses)
-    for (const auto& wall : scene_.walls)
-      if (wall.name == use.surface) {
-        sent_.push_back(wall.name);
-        surfaces.push_back({wall.name, wall.mesh.surface()});
-      }
-  for (std::size_t w = 0; w <= scene_.walls.size(); ++w) first_vertex_.push_back(walls.first_vertex(w));
+  for (const auto& use : run.uses) surfaces.push_back({use.surface, walls.surface(wall_of(use.surface))});
   for (auto& wall : scene_.walls) wall.mesh = {};  // the engine has it now
   engine_ = make_engine(scene_, std::move(particles), std::move(walls));
+  traffic_ = std::make_unique<Traffic>(scene_);
+  if (scene_.start_from && scene_.start_from->whole) read_state(scene_, *engine_, *traffic_);
   if (!run.results.empty() && scene_.write_particles) {
     std::filesystem::create_directories(run.results);
     pictures_ = std::make_unique<io::PvdSeries>(fmt::format("{}/{}.pvd", run.results, scene_.name));
     if (scene_.output_every > 0) write_particles(0);
-    next_picture_ = scene_.output_every;
   }
+  next_picture_ = scene_.output_every;
   return surfaces;
 }
 
-protocol::Advance Solver::advance(const protocol::Window& window, const std::vector<protocol::Field>&) {
+Particles Solver::first_particles(const WallSet& walls) const {
+  if (scene_.start_from) return read_particles(scene_);
+  return insert_particles(scene_, walls);
+}
+
+// Runs the particles between walls that stand until they have come to rest.
+Particles Solver::settled(Particles particles) const {
+  auto scene = scene_;
+  for (auto& wall : scene.walls) wall.motion = Motion();
+  scene.keeps_ledger = false;
+  const auto engine = make_engine(scene, std::move(particles));
+  double scale = 0;
+  for (std::size_t i = 0; i < engine->particles().size(); ++i)
+    scale += engine->particles().mass_of(i) * scene.gravity.norm() * engine->particles().radius_of(i);
+  const auto& settling = *scene_.settling;
+  // At rest twice in a row, a fall of one radius apart: nobody may be caught at the top of a flight.
+  const double radius = scene.largest_radius() > 0 ? scene.largest_radius() : std::sqrt(scale);
+  const double pause = std::sqrt(2 * radius / scene.gravity.norm());
+  const auto steps = static_cast<std::uint64_t>(std::max(1.0, std::ceil(pause / largest_step_)));
+  for (int at_rest = 0; at_rest < 2;) {
+    engine->advance(steps, largest_step_);
+    at_rest = engine->kinetic_energy() < settling.kinetic_energy * scale ? at_rest + 1 : 0;
+    if (engine->time() > settling.limit)
+      throw io::UserError(settling.where, fmt::format("the particles have not settled in {:.4g} s: their kinetic energy is {:.3g} of Σ m g r, and "
+                                                      "kinetic_energy asks for {:.3g}. Raise limit, or add damping or rolling resistance.",
+                                                      settling.limit, engine->kinetic_energy() / scale, settling.kinetic_energy));
+  }
+  return engine->particles();
+}
+
+protocol::Advance Solver::advance(const protocol::Window& window, const std::vector<protocol::Field>& received) {
   const auto begin = std::chrono::steady_clock::now();
   const auto steps = static_cast<std::uint64_t>(std::ceil(window.length / largest_step_ * (1 - 1e-12)));
   const double step = window.length / static_cast<double>(steps);
-  engine_->advance(steps, step);
+  prescribe(window, received);
+  step_through(steps, step);
   steps_ += steps;
   last_step_ = step;
-  const auto& load = engine_->wall_load();
-  couples_lost_ = std::max(couples_lost_, load.couples_lost);
+  couples_lost_ = std::max(couples_lost_, load_.couples_lost);
+  check_step(step);
 
   protocol::Advance result;
   result.steps = steps;
-  for (const auto& name : sent_)
-    for (std::size_t w = 0; w < scene_.walls.size(); ++w)
-      if (scene_.walls[w].name == name)
-        result.fields.push_back({name, "force",
-                                 load.vertex_force[w]});
+  for (const auto wall : sent_) result.fields.push_back({scene_.walls[wall].name, "force", load_.vertex_force[wall]});
   result.quantities = quantities(step);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   seconds_ += seconds;
   last_rate_ = static_cast<double>(engine_->particles().size()) * static_cast<double>(steps) / seconds;
-  if (pictures_) {
-    const bool last = window.end >= run_.end;
-    const bool due = scene_.output_every > 0 && window.end_time() >= next_picture_ * (1 - 1e-12);
-    if (last || due) write_particles(window.end_time());
-    while (scene_.output_every > 0 && next_picture_ <= window.end_time() * (1 + 1e-12)) next_picture_ += scene_.output_every;
-  }
+  write_output(window);
   return result;
 }
 
-std::vector<std::pair<std::string, double>> Solver::quantities(double step) const {
+void Solver::prescribe(const protocol::Window&, const std::vector<protocol::Field>& received) {
+  for (const auto wall : received_) {
+    const std::vector<Vec3>*displacement = nullptr, *velocity = nullptr;
+    for (const auto& field : received)
+      if (field.surface == scene_.walls[wall].name) (field.name == "velocity" ? velocity : displacement) = &field.values;
+    if (!displacement) continue;  // nothing was said: the wall stays
+    const std::vector<Vec3> still(displacement->size(), Vec3::Zero());
+    engine_->walls().prescribe(wall, *displacement, velocity ? *velocity : still, engine_->time());
+  }
+}
+
+// All steps of a window, with the inlets and outlets visited in between; load_ becomes the mean over all of them.
+void Solver::step_through(std::uint64_t steps, double step) {
+  if (traffic_->none()) {
+    engine_->advance(steps, step);
+    load_ = engine_->wall_load();
+    return;
+  }
+  const auto pause = std::min(steps, traffic_->steps_between(step));
+  WallLoad sum;
+  for (std::uint64_t done = 0; done < steps;) {
+    const auto some = std::min(pause, steps - done);
+    traffic_->visit(*engine_);
+    engine_->advance(some, step);
+    sum.add(engine_->wall_load(), static_cast<double>(some) / static_cast<double>(steps));
+    done += some;
+  }
+  load_ = std::move(sum);
+}
+
+// The bound of the stable step takes as long as some steps: it is looked at in the first window and then every two hundred steps.
+void Solver::check_step(double step) {
+  if (checked_at_ > 0 && steps_ < checked_at_ + 200) return;
+  checked_at_ = steps_;
+  const auto ratio = engine_->step_ratio(step);
+  step_ratio_ = ratio.value;
+  if (ratio.value <= 1 || scene_.allow_unstable_step) return;
+  const Vec3 x = engine_->particles().position[ratio.particle].vector();
+  throw std::runtime_error(fmt::format(
+      "the step of {:.4g} s may be unstable at t = {:.6g} s: it is {:.2f} of the bound for particle {} at ({:.4g}, {:.4g}, {:.4g}) m with the contacts "
+      "it has now. Lower {}, or say allow_unstable_step = true.",
+      step, engine_->time(), ratio.value, engine_->particles().id[ratio.particle], x[0], x[1], x[2], scene_.step ? "step" : "step_fraction"));
+}
+
+std::vector<std::pair<std::string, double>> Solver::quantities(double) {
   std::vector<std::pair<std::string, double>> values;
-  const auto& load = engine_->wall_load();
-  for (std::size_t w = 0; w < scene_.walls.size(); ++w)
-    for (int d = 0; d < scene_.dimension; ++d)
-      values.emplace_back(fmt::format("{}.force.{}", scene_.walls[w].name, "xyz"[d]), load.walls[w].force[d]);
+  for (std::size_t w = 0; w < scene_.walls.size(); ++w) {
+    const auto& wall = scene_.walls[w];
+    for (int d = 0; d < scene_.dimension; ++d) values.emplace_back(fmt::format("{}.force.{}", wall.name, "xyz"[d]), load_.walls[w].force[d]);
+    for (int d = scene_.dimension == 2 ? 2 : 0; d < 3; ++d)
+      values.emplace_back(fmt::format("{}.torque.{}", wall.name, "xyz"[d]), load_.walls[w].torque[d]);
+    if (wall.motion.kind() == Motion::Kind::servo) values.emplace_back(wall.name + ".travel", engine_->walls().servo_travel(w));
+  }
   values.emplace_back("weight", engine_->mass() * scene_.gravity.norm());
   values.emplace_back("kinetic_energy", engine_->kinetic_energy());
   values.emplace_back("particles", static_cast<double>(engine_->particles().size()));
   values.emplace_back("contacts", static_cast<double>(engine_->contact_count()));
-  values.emplace_back("step_ratio", engine_->step_ratio(step).value);
+  values.emplace_back("step_ratio", step_ratio_);
   values.emplace_back("overlap.max", engine_->worst_overlap());
+  traffic_->quantities(values);
+  if (engine_->keeps_ledger()) {
+    const auto e = engine_->energy();
+    for (const auto& [name, value] : std::initializer_list<std::pair<const char*, double>>{
+             {"kinetic", e.kinetic}, {"gravity", e.gravity}, {"normal", e.normal}, {"tangential", e.tangential}, {"rolling", e.rolling},
+             {"lost.normal", e.lost_normal}, {"lost.sliding", e.lost_sliding}, {"lost.rolling", e.lost_rolling}, {"lost.damping", e.lost_damping},
+             {"wall_work", e.wall_work}, {"added", e.added}, {"drift", e.drift}, {"relative_drift", e.relative_drift}})
+      values.emplace_back(fmt::format("energy.{}", name), value);
+  }
   return values;
+}
+
+void Solver::save() {
+  io::StateWriter writer((saved_.clear(), saved_));
+  writer("engine", *engine_);
+  writer("traffic", *traffic_);
+  writer("steps", steps_);
+  writer("checked_at", checked_at_);
+  saved_next_picture_ = next_picture_;
+}
+
+void Solver::restore() {
+  if (saved_.empty()) throw std::logic_error("restore without save");
+  io::StateReader reader(saved_);
+  reader("engine", *engine_);
+  reader("traffic", *traffic_);
+  reader("steps", steps_);
+  reader("checked_at", checked_at_);
+  reader.finish();
+  next_picture_ = saved_next_picture_;
+}
+
+void Solver::write_output(const protocol::Window& window) {
+  const bool last = window.end >= run_.end;
+  const bool due = scene_.output_every > 0 && window.end_time() >= next_picture_ * (1 - 1e-12);
+  if (last || due) {
+    if (pictures_) write_particles(window.end_time());
+    if (scene_.write_checkpoint && !run_.results.empty())
+      write_checkpoint(fmt::format("{}/checkpoint.h5", run_.results), scene_, *engine_, *traffic_);
+  }
+  while (scene_.output_every > 0 && next_picture_ <= window.end_time() * (1 + 1e-12)) next_picture_ += scene_.output_every;
 }
 
 void Solver::write_particles(double time) {
@@ -125,6 +246,7 @@ void Solver::write_particles(double time) {
 }
 
 std::vector<std::pair<std::string, double>> Solver::finish() {
+  for (const auto& warning : traffic_->warnings()) fmt::print(stderr, "{}\n", warning);
   if (couples_lost_)
     fmt::print(stderr, "{} triangles are too thin to carry the rolling couple they received; their force is exact\n", couples_lost_);
   const double work = static_cast<double>(engine_->particles().size()) * static_cast<double>(steps_);

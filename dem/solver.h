@@ -1,4 +1,4 @@
-// The particles as a participant: surfaces are the mesh walls, the field they send is `force`.
+// The particles as a participant: their surfaces are walls of meshes and lines.
 #pragma once
 
 #include <memory>
@@ -6,38 +6,56 @@
 #include <vector>
 
 #include "dem/engine.h"
+#include "dem/traffic.h"
+#include "io/archive.h"
 #include "io/vtk.h"
 #include "protocol/participant.h"
 
 namespace acopla::dem {
 
-/// Sends `force` [N] on every wall that is a mesh: the mean over the window, per vertex. Quantities of a window, in the
-/// order of the case's walls: WALL.force.x|y|z [N] (mean over the window), then weight [N], kinetic_energy [J], particles,
-/// contacts, step_ratio, overlap.max (over the radius).
+/// Sends `force` [N] on every wall that has vertices: the mean over the window, per vertex, in the wall's body axes. Receives
+/// `displacement` [m] and `velocity` [m/s] of a wall's vertices at the window's start; the wall then moves linearly until the next.
+///
+/// Quantities of a window: per wall WALL.force.x|y|z [N] and WALL.torque.x|y|z [N m] (means over the window; torque about the wall's
+/// reference point), of servos WALL.travel [m]; weight [N], kinetic_energy [J], particles, contacts, step_ratio, overlap.max (over the
+/// radius); with the ledger energy.* [J]; of inlets and outlets their masses [kg].
 class Solver final : public protocol::Participant {
  public:
   /// Reads and checks the table. @throws io::UserError
   Solver(const io::Table& root, const std::string& name);
 
-  protocol::Introduction introduce() const override { return {"dem", 3, {}}; }
+  protocol::Introduction introduce() const override { return {"dem", scene_.dimension, {"save"}}; }
   std::vector<protocol::Surface> start(const protocol::Run& run) override;
   protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override;
   std::vector<std::pair<std::string, double>> finish() override;
+  void save() override;
+  void restore() override;
 
  private:
-  void check_uses(const protocol::Run& run) const;
-  std::vector<std::pair<std::string, double>> quantities(double step) const;
+  void check_uses(const protocol::Run& run);
+  std::size_t wall_of(const std::string& surface) const;
+  Particles first_particles(const WallSet& walls) const;
+  Particles settled(Particles particles) const;
+  void prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received);
+  void step_through(std::uint64_t steps, double step);
+  void check_step(double step);
+  std::vector<std::pair<std::string, double>> quantities(double step);
+  void write_output(const protocol::Window& window);
   void write_particles(double time);
 
   Scene scene_;
   double largest_step_;
   std::unique_ptr<Engine> engine_;
-  std::vector<std::string> sent_;  // walls the coupling uses
-  std::vector<std::uint32_t> first_vertex_;
+  std::unique_ptr<Traffic> traffic_;
+  std::vector<std::size_t> sent_, received_;  // walls the coupling uses
+  WallLoad load_;                             // mean over the window
+  io::State saved_;
+  double saved_next_picture_ = 0;
   protocol::Run run_;
   std::unique_ptr<io::PvdSeries> pictures_;
   double next_picture_ = 0;
-  std::uint64_t steps_ = 0;
+  std::uint64_t steps_ = 0, checked_at_ = 0;
+  double step_ratio_ = 0;
   std::size_t couples_lost_ = 0, triangles_dropped_ = 0;
   double seconds_ = 0;
   double last_step_ = 0, last_rate_ = 0;

@@ -14,6 +14,7 @@ namespace acopla::dem {
 /// (`twisting`): the area of contact that resists it is smaller than the arm of rolling.
 struct ElasticPlastic {
   static constexpr const char* name = "elastic_plastic";
+  static constexpr bool needs_friction = true;
   static constexpr std::array fields{
       Field{"damping_ratio", "", io::non_negative, 0.3, "η_r: share of critical damping of the rolling spring"},
       Field{"stiffness_factor", "", io::positive, 1.0, "k_r over k_t R²"},

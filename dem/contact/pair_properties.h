@@ -28,12 +28,12 @@ struct LawSet {
   std::string text() const { return normal + " + " + tangential + " + " + rolling; }
 };
 
-/// Properties of a pair of materials. A value that the scene's laws do not use is left at 0.
+/// Properties of a pair of materials. A value that the scene's laws do not use may be left at 0.
 struct PairProperties {
   LawSet laws;                  ///< without a normal law the pair never meets
   double modulus = 0;           ///< Y* = 1 / ((1−ν_i²)/E_i + (1−ν_j²)/E_j) [Pa]
   double shear_modulus = 0;     ///< G* = 1 / ((2−ν_i)/G_i + (2−ν_j)/G_j) [Pa]
-  double stiffness = 0;         ///< linear normal spring [N/m]
+  double stiffness = 0;         ///< linear normal spring [N/m]; of a user's law its slope at 5 % overlap, for the step
   double hertz_damping = 0;     ///< 2 sqrt(5/6) β
   double damping_ratio = 0;     ///< of the linear spring
   double restitution = 1;

@@ -39,6 +39,19 @@ struct InletState {
   double choked_since = -1;                ///< time of the first refusal of the present choke [s]; −1: not choked
   double time = 0;                         ///< of the last call [s]
   bool operator==(const InletState&) const = default;
+
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("random", random);
+    archive("next_radius", next_radius);
+    archive("delivered_of_class", delivered_of_class);
+    archive("delivered", delivered);
+    archive("count", count);
+    archive("refusals", refusals);
+    archive("largest_backlog", largest_backlog);
+    archive("choked_since", choked_since);
+    archive("time", time);
+  }
 };
 
 /// Delivers an inlet's particles when they are due. The mass delivered is rate × time rounded to whole particles: never off by more

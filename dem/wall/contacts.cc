@@ -112,6 +112,12 @@ void WallContactList::sort_by_wall(const WallSet& walls, Group& group) {
     group.lone[k] = lone[order[k]];
     group.flats[k] = flats[order[k]];
   }
+  group.runs.clear();
+  for (std::uint32_t k = 0; k < group.lone.size(); ++k) {
+    const auto wall = walls.wall_of(group.lone[k].element);
+    if (group.runs.empty() || group.runs.back().wall != wall) group.runs.push_back({wall, 0});
+    group.runs.back().end = k + 1;
+  }
 }
 
 void WallContactList::find(const KernelTable& kernels, const WallSet& walls, const Particles& particles, std::uint32_t first, std::uint32_t last,
@@ -283,38 +289,63 @@ void WallContactList::update(const WallSet& walls, const Particles& particles, d
 void WallContactList::touch_lone(Group& group, const WallSet& walls, const Particles& particles, double time) {
   auto& contacts = group.contacts;
   const Record* const position = particles.position.data();
-  const bool fills_velocity = group.moves || group.ruled > 0 || !group.balls.empty();
   std::size_t count = 0;
   bool through = false;
-  for (std::size_t k = 0; k < group.lone.size(); ++k) {
-    const auto& lone = group.lone[k];
-    const auto& x = position[lone.particle];
-    Record flat = group.flats[k];
-    Vec3 velocity = Vec3::Zero();
-    if (group.moves) {
-      const auto wall = walls.wall_of(lone.element);
-      if (walls.moves(wall)) {
-        flat = walls.to_world(wall, flat);
-        const double height = flat.x * x.x + flat.y * x.y + flat.z * x.z - flat.w;
-        velocity = walls.rigid_velocity(wall, x.vector() - height * flat.vector());
-      }
-      if (group.turns) contacts.wall_spin[count].set(walls.spin_of(lone.element));
-    }
+  const auto touch = [&](std::size_t k, const Record& flat) {
+    const auto particle = group.lone[k].particle;
+    const auto& x = position[particle];
     const double height = flat.x * x.x + flat.y * x.y + flat.z * x.z - flat.w, overlap = x.w - height;
-    contacts.particle[count] = lone.particle;
+    contacts.particle[count] = particle;
     contacts.normal[count] = {flat.x, flat.y, flat.z, overlap};
-    if (fills_velocity) contacts.velocity[count] = {velocity[0], velocity[1], velocity[2], 1};
-    if (group.curved) contacts.curvature[count] = 0;
     group.key[count] = static_cast<std::uint32_t>(k);
-    count += overlap > 0;
     through |= !(height > least_distance * x.w);
+    return overlap > 0;
+  };
+  std::size_t k = 0;
+  for (const auto& [wall, end] : group.runs) {
+    if (!group.moves && group.ruled == 0 && group.balls.empty()) {  // all velocities are zero and stay so
+      for (; k < end; ++k) count += touch(k, group.flats[k]);
+    } else if (!walls.moves(wall)) {
+      for (; k < end; ++k) {
+        contacts.velocity[count] = {0, 0, 0, 1};
+        if (group.turns) contacts.wall_spin[count] = {};
+        if (group.curved) contacts.curvature[count] = 0;
+        count += touch(k, group.flats[k]);
+      }
+    } else if (!walls.turns(wall)) {
+      const Vec3 shift = walls.shift(wall), v = walls.velocity(wall);
+      const Record velocity{v[0], v[1], v[2], 1};
+      for (; k < end; ++k) {
+        Record flat = group.flats[k];
+        flat.w += flat.x * shift[0] + flat.y * shift[1] + flat.z * shift[2];
+        contacts.velocity[count] = velocity;
+        if (group.turns) contacts.wall_spin[count] = {};
+        if (group.curved) contacts.curvature[count] = 0;
+        count += touch(k, flat);
+      }
+    } else {
+      const Record spin = record_of(walls.spin_of(group.lone[k].element));
+      for (; k < end; ++k) {
+        const Record flat = walls.to_world(wall, group.flats[k]);
+        const auto& x = position[group.lone[k].particle];
+        const double height = flat.x * x.x + flat.y * x.y + flat.z * x.z - flat.w;
+        const Vec3 velocity = walls.rigid_velocity(wall, x.vector() - height * flat.vector());
+        contacts.velocity[count] = {velocity[0], velocity[1], velocity[2], 1};
+        if (group.turns) contacts.wall_spin[count] = spin;
+        if (group.curved) contacts.curvature[count] = 0;
+        count += touch(k, flat);
+      }
+    }
   }
   contacts.size = count;
-  if (!through) return;
+  if (through) stop_lone(group, walls, particles, time);
+}
+
+void WallContactList::stop_lone(const Group& group, const WallSet& walls, const Particles& particles, double time) {
   for (std::size_t k = 0; k < group.lone.size(); ++k) {
     const auto& lone = group.lone[k];
     const auto flat = walls.to_world(walls.wall_of(lone.element), group.flats[k]);
-    const auto& x = position[lone.particle];
+    const auto& x = particles.position[lone.particle];
     if (!(flat.x * x.x + flat.y * x.y + flat.z * x.z - flat.w > least_distance * x.w)) stop_at_wall(walls, particles, lone.particle, lone.element, time);
   }
 }

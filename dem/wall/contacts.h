@@ -77,6 +77,9 @@ class WallContactList {
   struct Near {
     std::uint32_t particle, element;
   };
+  struct Run {
+    std::uint32_t wall, end;
+  };
   // What a contact by the rules leaves for the next step and for the loads.
   struct Detail {
     Record point, normal;
@@ -91,6 +94,7 @@ class WallContactList {
     std::size_t numbers = 0;                            // a history has
     std::vector<Near> lone;     // particles over the inside of a plane or facet
     std::vector<Record> flats;  // of each: normal on the particle's side, and normal · x on it; in body axes
+    std::vector<Run> runs;      // of lone candidates, by wall
     std::vector<Near> balls;
     std::size_t ruled = 0;  // candidates by the rules
     WallContacts contacts;
@@ -116,6 +120,7 @@ class WallContactList {
       archive("numbers", numbers);
       archive("lone", lone);
       archive("flats", flats);
+      archive("runs", runs);
       archive("balls", balls);
       archive("ruled", ruled);
       archive("particle", contacts.particle);
@@ -138,8 +143,9 @@ class WallContactList {
   bool find_lone(const WallSet& walls, const Record& position, double travel, std::span<const std::uint32_t> elements);
   static void sort_by_wall(const WallSet& walls, Group& group);
   static void start_step(Group& group);
-  void touch_lone(Group& group, const WallSet& walls, const Particles& particles, double time);
-  void touch_balls(Group& group, const WallSet& walls, const Particles& particles, double time);
+  static void touch_lone(Group& group, const WallSet& walls, const Particles& particles, double time);
+  static void stop_lone(const Group& group, const WallSet& walls, const Particles& particles, double time);
+  static void touch_balls(Group& group, const WallSet& walls, const Particles& particles, double time);
   void touch_by_rules(const WallSet& walls, const Particles& particles, double time);
   void add_by_rules(const WallSet& walls, std::uint8_t particle_material, std::uint32_t particle, std::uint32_t near, const NearestPoint& contact,
                     double overlap, double weight);

@@ -1,5 +1,7 @@
 #include "dem/wall/load.h"
 
+#include <algorithm>
+
 #include <array>
 
 #include "dem/wall/wall_set.h"
@@ -75,6 +77,21 @@ WallLoad WallLoadSum::finish(const WallSet& walls, double steps) {
     }
   }
   return load;
+}
+
+void WallLoad::add(const WallLoad& other, double share) {
+  if (walls.empty()) {
+    walls.resize(other.walls.size());
+    vertex_force.resize(other.vertex_force.size());
+    for (std::size_t w = 0; w < vertex_force.size(); ++w) vertex_force[w].assign(other.vertex_force[w].size(), Vec3::Zero());
+  }
+  for (std::size_t w = 0; w < walls.size(); ++w) {
+    walls[w].force += share * other.walls[w].force;
+    walls[w].torque += share * other.walls[w].torque;
+    walls[w].power += share * other.walls[w].power;
+    for (std::size_t v = 0; v < vertex_force[w].size(); ++v) vertex_force[w][v] += share * other.vertex_force[w][v];
+  }
+  couples_lost = std::max(couples_lost, other.couples_lost);
 }
 
 }  // namespace acopla::dem

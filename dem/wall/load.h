@@ -52,6 +52,9 @@ struct WallLoad {
   /// One list a wall, empty unless it is sent: on every vertex [N], in the wall's body axes. Force and moment of the contacts are exact.
   std::vector<std::vector<Vec3>> vertex_force;
   std::size_t couples_lost = 0;                 ///< facets too thin to carry the couple they received
+
+  /// Adds a share of another load of the same walls; an empty one takes its shape.
+  void add(const WallLoad& other, double share);
 };
 
 /// Sums the forces of a window's steps. The forces at the window's ends belong half to each of its neighbours.

@@ -68,6 +68,7 @@ WallSet::WallSet(std::vector<Wall> walls) : walls_(std::move(walls)) {
     const auto& motion = walls_[w].motion;
     const auto first = vertices_.begin() + first_vertex_[w], last = vertices_.begin() + first_vertex_[w + 1];
     if (motion.kind() == Motion::Kind::prescribed) {
+      frames_[w].deforms = true;
       auto& prescribed = prescribed_[w];
       prescribed.position.assign(first, last);
       prescribed.velocity.assign(prescribed.position.size(), Vec3::Zero());
@@ -111,6 +112,7 @@ void WallSet::add_facet(std::uint32_t wall, const std::array<std::uint32_t, 3>& 
     }
     facet.radius = std::sqrt(square);
   }
+  for (std::size_t k = 0; k < 3; ++k) facet.square_height[k] = 1 / facet.gradient[k].squaredNorm();
   facets_.push_back(facet);
   element_wall_.push_back(wall);
 }
@@ -265,37 +267,25 @@ std::optional<geometry::Box> WallSet::bounds() const {
 }
 
 void WallSet::find_near(const Vec3& centre, double reach, std::vector<std::uint32_t>& found) const {
-  const auto begin = static_cast<std::ptrdiff_t>(found.size());
   const auto first_ball = static_cast<std::uint32_t>(facets_.size() + planes_.size());
-  const double far = reach * reach;
   for (std::size_t w = 0; w < walls_.size(); ++w) {
     if (!grids_[w]) continue;
+    const bool glued = walls_[w].glued_diameter > 0;
+    const auto first_item = glued ? first_ball + first_ball_[w] : first_facet_[w];
+    const auto begin = static_cast<std::ptrdiff_t>(found.size());
     const Vec3 body = to_body(w, centre), half = Vec3::Constant(reach);
-    const bool glued = walls_[w].glued_diameter > 0, deforming = deforms(w);
-    grids_[w]->for_each_near(body - half, body + half, [&](std::uint32_t item) {
-      if (glued) {
-        const auto element = first_ball + first_ball_[w] + item;
-        const auto now = ball(element);
-        const double bound = reach + now.radius;
-        if ((centre - now.centre).squaredNorm() <= bound * bound) found.push_back(element);
-        return;
-      }
-      const auto element = first_facet_[w] + item;
-      const auto& facet = facets_[element];
-      if (!deforming) {
-        const Vec3 from_centre = body - facet.centre;
-        const double bound = reach + facet.radius;
-        if (from_centre.squaredNorm() > bound * bound || std::abs(from_centre.dot(facet.normal)) > reach) return;
-      }
+    grids_[w]->for_each_near(body - half, body + half, [&](std::uint32_t item) { found.push_back(first_item + item); });
+    std::sort(found.begin() + begin, found.end());
+    found.erase(std::unique(found.begin() + begin, found.end()), found.end());
+    const auto is_far = [&](std::uint32_t element) {
       NearestPoint nearest;
-      find_nearest(facet, body, nearest);
-      if (nearest.distance * nearest.distance <= far) found.push_back(element);
-    });
+      return glued ? !touches(element, centre, reach, nearest) : !touches_facet(facets_[element], body, reach, nearest);
+    };
+    found.erase(std::remove_if(found.begin() + begin, found.end(), is_far), found.end());
   }
   for (std::size_t k = 0; k < planes_.size(); ++k)
     if ((centre - planes_[k].point).dot(planes_[k].normal) < reach) found.push_back(static_cast<std::uint32_t>(facets_.size() + k));
-  std::sort(found.begin() + begin, found.end());
-  found.erase(std::unique(found.begin() + begin, found.end()), found.end());
+  if (!balls_.empty() && !planes_.empty()) std::sort(found.begin(), found.end());
 }
 
 bool WallSet::touches(std::uint32_t element, const Vec3& centre, double radius, NearestPoint& nearest) const {
@@ -314,8 +304,9 @@ bool WallSet::touches(std::uint32_t element, const Vec3& centre, double radius, 
   if (is_ball(element)) {
     const auto now = ball(element);
     const Vec3 line = centre - now.centre;
+    const double bound = radius + now.radius;
+    if (line.squaredNorm() >= bound * bound) return false;
     const double distance = line.norm();
-    if (distance >= radius + now.radius) return false;
     nearest.distance = distance - now.radius;
     nearest.normal = distance > 0 ? Vec3(line / distance) : Vec3(Vec3::UnitX());
     nearest.point = now.centre + now.radius * nearest.normal;
@@ -333,15 +324,21 @@ bool WallSet::touches(std::uint32_t element, const Vec3& centre, double radius, 
 }
 
 bool WallSet::touches_facet(const Facet& facet, const Vec3& body, double radius, NearestPoint& nearest) const {
-  if (!deforms(facet.wall)) {
+  if (!frames_[facet.wall].deforms) {
     const Vec3 from_centre = body - facet.centre;
     const double height = from_centre.dot(facet.normal), bound = radius + facet.radius;
     if (std::abs(height) >= radius || from_centre.squaredNorm() >= bound * bound) return false;
     const bool segment = facet.vertices[2] == none;
-    const double mean = segment ? 0.5 : 1.0 / 3.0;
-    const std::array<double, 3> weights{mean + facet.gradient[0].dot(from_centre), mean + facet.gradient[1].dot(from_centre),
-                                        segment ? 0 : mean + facet.gradient[2].dot(from_centre)};
-    if (weights[0] > 0 && weights[1] > 0 && (segment || weights[2] > 0)) {
+    const double mean = segment ? 0.5 : 1.0 / 3.0, left = radius * radius - height * height;
+    std::array<double, 3> weights{};
+    bool inside = true;
+    for (std::size_t k = 0; k < (segment ? 2 : 3); ++k) {
+      weights[k] = mean + facet.gradient[k].dot(from_centre);
+      if (weights[k] > 0) continue;
+      inside = false;
+      if (weights[k] * weights[k] * facet.square_height[k] > left * (1 + 1e-12)) return false;  // so far beyond that edge
+    }
+    if (inside) {
       // By the facet's own normal: the response of a split plane is the plane's to round-off.
       nearest.distance = std::abs(height);
       nearest.normal = height < 0 ? Vec3(-facet.normal) : facet.normal;
@@ -356,22 +353,27 @@ bool WallSet::touches_facet(const Facet& facet, const Vec3& body, double radius,
 }
 
 void WallSet::find_nearest(const Facet& facet, const Vec3& body, NearestPoint& nearest) const {
-  const bool deforming = deforms(facet.wall);
-  const auto at = [&](std::size_t k) { return deforming ? body_vertex(facet.vertices[k]) : vertices_[facet.vertices[k]]; };
-  const Vec3 a = at(0), b = at(1);
-  Vec3 normal = facet.normal;
+  const bool deforming = frames_[facet.wall].deforms;
+  const auto size = facet.vertices[2] == none ? 2u : 3u;
+  std::array<Vec3, 3> corner;
+  if (deforming) {
+    const auto& prescribed = prescribed_[facet.wall];
+    const auto first = first_vertex_[facet.wall];
+    for (std::size_t k = 0; k < size; ++k)
+      corner[k] = prescribed.position[facet.vertices[k] - first] + (time_ - prescribed.start) * prescribed.velocity[facet.vertices[k] - first];
+  } else {
+    for (std::size_t k = 0; k < size; ++k) corner[k] = vertices_[facet.vertices[k]];
+  }
   double squared = 0;
-  if (facet.vertices[2] == none) {
-    const auto found = geometry::nearest_on_segment(body, a, b);
+  if (size == 2) {
+    const auto found = geometry::nearest_on_segment(body, corner[0], corner[1]);
     squared = found.squared_distance;
     nearest.weights = {found.weights[0], found.weights[1], 0};
     nearest.point = found.point;
     nearest.feature_size = found.feature == geometry::SegmentFeature::inside ? 0 : 1;
     nearest.feature[0] = facet.vertices[found.feature == geometry::SegmentFeature::vertex1];
-    if (deforming) normal = Vec3(a[1] - b[1], b[0] - a[0], 0).normalized();
   } else {
-    const Vec3 c = at(2);
-    const auto found = geometry::nearest_on_triangle(body, a, b, c);
+    const auto found = geometry::nearest_on_triangle(body, corner[0], corner[1], corner[2]);
     squared = found.squared_distance;
     nearest.weights = found.weights;
     nearest.point = found.point;
@@ -383,15 +385,20 @@ void WallSet::find_nearest(const Facet& facet, const Vec3& body, NearestPoint& n
       nearest.feature[0] = facet.vertices[first];
       nearest.feature[1] = facet.vertices[(first + 1) % 3];
     }
-    if (deforming) normal = (b - a).cross(c - a).normalized();
   }
+  const auto normal = [&]() -> Vec3 {
+    if (!deforming) return facet.normal;
+    if (size == 2) return Vec3(corner[0][1] - corner[1][1], corner[1][0] - corner[0][0], 0).normalized();
+    return (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
+  };
   if (nearest.feature_size == 0) {
-    const double height = normal.dot(body - (deforming ? a : facet.centre));
+    nearest.normal = normal();
+    const double height = nearest.normal.dot(body - (deforming ? corner[0] : facet.centre));
     nearest.distance = std::abs(height);
-    nearest.normal = height < 0 ? Vec3(-normal) : normal;
+    if (height < 0) nearest.normal = -nearest.normal;
   } else {
     nearest.distance = std::sqrt(squared);
-    nearest.normal = nearest.distance > 0 ? Vec3((body - nearest.point) / nearest.distance) : normal;
+    nearest.normal = nearest.distance > 0 ? Vec3((body - nearest.point) / nearest.distance) : normal();
   }
 }
 

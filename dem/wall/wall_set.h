@@ -108,6 +108,8 @@ class WallSet {
   /// Point about which torques on the wall are given, now [m]: the centre of a motion that turns; else the plane's point or the mean of
   /// the vertices, moving with the wall (a prescribed wall's stays).
   const Vec3& reference(std::size_t wall) const { return frames_[wall].reference; }
+  const Vec3& velocity(std::size_t wall) const { return frames_[wall].velocity; }  ///< of the reference, of a rigid wall [m/s]
+  const Vec3& shift(std::size_t wall) const { return frames_[wall].shift; }        ///< world = rotation · body + shift [m]
   /// From body to world axes.
   const Eigen::Matrix3d& rotation(std::size_t wall) const { return frames_[wall].rotation; }
 
@@ -151,7 +153,7 @@ class WallSet {
   // What the contact lists need to know of elements.
 
   /// The vertices of this wall move against each other: its facets have no body of their own.
-  bool deforms(std::size_t wall) const { return walls_[wall].motion.kind() == Motion::Kind::prescribed; }
+  bool deforms(std::size_t wall) const { return frames_[wall].deforms; }
   bool turns(std::size_t wall) const { return frames_[wall].turns; }
   bool moves(std::size_t wall) const { return frames_[wall].moves; }
   Vec3 to_body(std::size_t wall, const Vec3& world) const {
@@ -189,6 +191,7 @@ class WallSet {
     std::uint32_t wall;
     Vec3 normal, centre;
     std::array<Vec3, 3> gradient;
+    std::array<double, 3> square_height;  // of the vertices over the edges opposite [m²]
     double radius;  // of the ball around the centre that holds the vertices [m]
   };
   struct Plane {
@@ -202,7 +205,8 @@ class WallSet {
     double radius;
   };
   struct Frame {
-    bool moves = false, turns = false;
+    bool moves = false, turns = false;  // as a rigid body
+    bool deforms = false;
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Vec3 shift = Vec3::Zero();  // x = rotation · body + shift
     Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();

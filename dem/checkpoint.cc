@@ -1,0 +1,107 @@
+#include "dem/checkpoint.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/checkpoint.h"
+
+namespace acopla::dem {
+namespace {
+
+constexpr const char* program_version = "acopla-dem 0.1.0";
+
+// What decides how a state is laid out. Two scenes with the same description can read each other's states.
+std::string description(const Scene& scene) {
+  std::string text = fmt::format("{}D {} partitions", scene.dimension, scene.partitions);
+  for (const auto& material : scene.materials) text.append(1, ' ').append(material.name);
+  for (const auto& pair : scene.pairs) text.append(1, ' ').append(pair.laws.text());
+  for (const auto& wall : scene.walls) text.append(1, ' ').append(wall.name);
+  text += fmt::format(" {} {} {}", scene.inlets.size(), scene.outlets.size(), scene.keeps_ledger);
+  std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  return fmt::format("{:016x}", hash);
+}
+
+// The head of a state, which a run with other walls and laws can read too.
+struct Head {
+  int dimension = 3;
+  bool rotates = true;
+  std::vector<std::string> materials;
+  Particles particles;
+
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("dimension", dimension);
+    archive("rotates", rotates);
+    archive("materials", materials);
+    archive("particles", particles);
+  }
+};
+
+[[noreturn]] void fail(const Scene& scene, const std::string& sentence) { throw io::UserError(scene.start_from->where, sentence); }
+
+io::State read_file(const Scene& scene, io::CheckpointInfo& info) {
+  auto [state, found] = io::read_checkpoint(scene.start_from->file);
+  info = found;
+  return std::move(state);
+}
+
+}  // namespace
+
+void write_checkpoint(const std::string& path, const Scene& scene, const Engine& engine, const Traffic& traffic) {
+  Head head;
+  head.dimension = scene.dimension;
+  head.rotates = scene.rotates();
+  for (const auto& material : scene.materials) head.materials.push_back(material.name);
+  head.particles = engine.particles();
+  io::State state;
+  io::StateWriter writer(state);
+  writer("head", head);
+  writer("engine", engine);
+  writer("traffic", traffic);
+  io::write_checkpoint(path, state, {program_version, scene.name, engine.time(), 0, description(scene)});
+}
+
+Particles read_particles(const Scene& scene) {
+  io::CheckpointInfo info;
+  const auto state = read_file(scene, info);
+  Head head;
+  io::StateReader reader(state);
+  reader("head", head);
+  if (head.dimension != scene.dimension)
+    fail(scene, fmt::format("start_from = \"{}\" holds particles of {} dimensions, and the case has {}.", scene.start_from->file, head.dimension,
+                            scene.dimension));
+  Particles particles;
+  particles.kind = scene.kind();
+  auto& old = head.particles;
+  old.kind = {head.dimension, head.rotates};
+  for (std::size_t i = 0; i < old.size(); ++i) {
+    const auto& name = head.materials[old.material[i]];
+    const auto found = std::find_if(scene.materials.begin(), scene.materials.end(), [&](const Material& m) { return m.name == name; });
+    if (found == scene.materials.end())
+      fail(scene, fmt::format("start_from = \"{}\" holds particles of {}, which is not in {}.material. Add it.", scene.start_from->file, name, scene.name));
+    particles.add(old.position[i].vector(), old.radius_of(i), found->density, static_cast<std::uint8_t>(found - scene.materials.begin()),
+                  old.velocity_of(i), old.spin_of(i));
+    particles.id.back() = old.id[i];
+  }
+  particles.next_id = std::max(particles.next_id, old.next_id);
+  return particles;
+}
+
+void read_state(const Scene& scene, Engine& engine, Traffic& traffic) {
+  io::CheckpointInfo info;
+  const auto state = read_file(scene, info);
+  if (info.program_version != program_version || info.case_hash != description(scene))
+    fail(scene, fmt::format("start_from = \"{}\" is the state of another scene ({} of {}): materials, laws, walls, partitions, inlets and the "
+                            "energy ledger must be the same to go on bit by bit. Use take = \"particles\".",
+                            scene.start_from->file, info.participant, info.program_version));
+  Head head;
+  io::StateReader reader(state);
+  reader("head", head);
+  reader("engine", engine);
+  reader("traffic", traffic);
+  reader.finish();
+}
+
+}  // namespace acopla::dem

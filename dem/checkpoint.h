@@ -1,0 +1,21 @@
+// Saving a scene's state to a file, and starting another run from it.
+#pragma once
+
+#include <string>
+
+#include "dem/engine.h"
+#include "dem/traffic.h"
+
+namespace acopla::dem {
+
+/// Everything that a run needs to go on bit by bit.
+void write_checkpoint(const std::string& path, const Scene& scene, const Engine& engine, const Traffic& traffic);
+
+/// The particles of a checkpoint: places, sizes, materials by name, velocities; ids are kept. @throws io::UserError, located at
+/// start_from, when it is no checkpoint, of another dimension, or has a material the scene does not know
+Particles read_particles(const Scene& scene);
+
+/// The whole state of a checkpoint into an engine of the same scene. @throws io::UserError when it is of another scene
+void read_state(const Scene& scene, Engine& engine, Traffic& traffic);
+
+}  // namespace acopla::dem
