@@ -89,7 +89,7 @@ Outcome elastic_collision(double fraction, std::size_t soft) {
   const auto& p = about["parameters"];
   const auto& expected = about["values"]["soft"][soft];
   const double r1 = p["radius_1"], r2 = p["radius_2"], m = p["mass"], offset = p["offset"], speed = p["speed"];
-  Setup setup;
+  OneMaterial setup;
   setup.dimension = 2;
   setup.radius = r1;
   setup.density = m / (M_PI * r1 * r1);
@@ -155,7 +155,7 @@ Outcome hertz_head_on(double fraction) {
 Outcome restitution(double fraction, const std::string& normal, double e, bool paper) {
   const auto& expected = reference()["restitution"]["values"][fmt::format("{}", e)];
   const bool hertz = normal == "hertz";
-  Setup setup;
+  OneMaterial setup;
   if (hertz) {
     setup.normal = "\"hertz\"";
     setup.shear_modulus = 5e6;
@@ -199,7 +199,7 @@ Outcome oblique_impact(double fraction, double e, double tangential) {
   const auto& about = reference()["oblique_impact"];
   const auto& p = about["parameters"];
   const auto& expected = about["values"][fmt::format("e_{:g}_tangential_{:g}_engine", e, tangential)];
-  Setup setup;
+  OneMaterial setup;
   setup.radius = p["radius"];
   setup.density = p["density"];
   setup.normal = linear(p["normal_stiffness"]);
@@ -225,7 +225,7 @@ Outcome bouncing_ball(double fraction, const std::string& law, double e) {
   const auto& p = reference()["bouncing_ball"]["parameters"];
   const auto& expected = reference()["bouncing_ball"]["values"][fmt::format("{}_e_{:g}", law, e)];
   const double stiffness = expected["stiffness"];
-  Setup setup;
+  OneMaterial setup;
   setup.gravity = down();
   setup.radius = p["radius"];
   setup.density = p["density"];
@@ -281,7 +281,7 @@ struct Roller {
 };
 
 Run put_down(const Roller& roller, double fraction, Outcome& outcome) {
-  Setup setup;
+  OneMaterial setup;
   setup.dimension = roller.disc ? 2 : 3;
   setup.gravity = down(roller.slope);
   setup.radius = roller.radius;
@@ -422,10 +422,14 @@ Outcome incline(double fraction, const std::string& key) {
   const auto& samples = expected["engine_samples_t_x_v_w"];
   const double distance = std::abs(samples.back()[1].get<double>()), speed = 0.2 * standard_gravity * std::sin(roller.slope);
   compare_samples(run, samples, r, distance, speed, outcome);
+  // While it rolls, with the couple at its limit μ_r r N and friction at the arm a: v' (m + I/a²) = m g sin θ − μ_r r N / a.
+  const bool rolls = std::abs(samples.back()[2].get<double>()) > 1e-4;
+  const double arm = r - roller.mass() * standard_gravity * std::cos(roller.slope) / roller.normal_stiffness;
+  const double rolling = standard_gravity * (std::sin(roller.slope) - roller.rolling_friction * std::cos(roller.slope) * r / arm) /
+                         (1 + roller.inertia() / (roller.mass() * arm * arm));
   const double before = velocity(*run.engine)[0];
   run.to(run.engine->time() + 0.1);
-  add(outcome, "acceleration afterwards [m/s²]", (velocity(*run.engine)[0] - before) / 0.1,
-      expected["stays"].get<bool>() ? 0 : expected["acceleration_while_it_rolls"].get<double>(), standard_gravity * 0.2);
+  add(outcome, "acceleration afterwards [m/s²]", (velocity(*run.engine)[0] - before) / 0.1, rolls ? rolling : 0, 0.2 * standard_gravity);
   return outcome;
 }
 
@@ -473,7 +477,7 @@ Outcome free_vibration(double fraction, double zeta) {
   const auto& about = reference()["free_vibration"];
   const auto &p = about["parameters"], &values = about["values"];
   const auto& expected = values[fmt::format("zeta_{:g}", zeta)];
-  Setup setup;
+  OneMaterial setup;
   setup.gravity = down();
   setup.radius = p["radius"];
   setup.density = p["density"];
@@ -505,7 +509,7 @@ constexpr double swings = 1.3;  // how many periods the oscillations are followe
 }  // namespace
 
 Outcome normal_oscillation(double fraction, double zeta) {
-  Setup setup;
+  OneMaterial setup;
   setup.gravity = down();
   setup.normal = linear(1e4);
   auto scene = scene_of(setup);

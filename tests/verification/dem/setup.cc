@@ -8,7 +8,7 @@
 
 namespace acopla::dem::verification {
 
-Scene scene_of(const Setup& s) {
+Scene scene_of(const OneMaterial& s) {
   const bool flat = s.dimension == 2;
   const auto vector = [&](const Vec3& v) { return flat ? fmt::format("[{}, {}]", v[0], v[1]) : fmt::format("[{}, {}, {}]", v[0], v[1], v[2]); };
   std::string text = fmt::format("dimension = {}\nend = 1.0\ngravity = {}\n[g]\nsolver = \"dem\"\n{}\n[g.material.m]\ndensity = {}\n", s.dimension,

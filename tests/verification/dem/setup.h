@@ -13,7 +13,7 @@ namespace acopla::dem::verification {
 inline constexpr double standard_gravity = 9.81;  ///< of reference.json [m/s²]
 
 /// What a case would say; numbers in SI units.
-struct Setup {
+struct OneMaterial {
   int dimension = 3;
   Vec3 gravity = Vec3::Zero();
   double density = 2500, radius = 0.01;     ///< of the particles that the critical step is for
@@ -23,7 +23,7 @@ struct Setup {
   bool paper = false;                       ///< the papers' printed damping formula
   std::string more;                         ///< further lines of the participant's table
 };
-Scene scene_of(const Setup& setup);
+Scene scene_of(const OneMaterial& setup);
 
 /// Law entries of a case.
 std::string linear(double stiffness);
