@@ -35,7 +35,8 @@ class Solver final : public protocol::Participant {
   void check_uses(const protocol::Run& run);
   std::size_t wall_of(const std::string& surface) const;
   Particles first_particles(const WallSet& walls) const;
-  Particles settled(Particles particles) const;
+  void settle(Engine& engine) const;
+  Particles settled_between_standing_walls(Particles particles) const;
   void prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received);
   void step_through(std::uint64_t steps, double step);
   void check_step(double step);
@@ -56,6 +57,7 @@ class Solver final : public protocol::Participant {
   double next_picture_ = 0;
   std::uint64_t steps_ = 0, checked_at_ = 0;
   double step_ratio_ = 0;
+  bool beyond_limit_ = false;  // at the last look
   std::size_t couples_lost_ = 0, triangles_dropped_ = 0;
   double seconds_ = 0;
   double last_step_ = 0, last_rate_ = 0;

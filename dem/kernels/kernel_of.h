@@ -138,6 +138,7 @@ class KernelOf final : public Kernel {
     History& history = *reinterpret_cast<History*>(stored);
     const DoublePack half_step = k.closing_speed, before = history.closing_speed;
     k.closing_speed = select(before == DoublePack(0.0), half_step, 1.5 * half_step - 0.5 * before);
+    k.half_step_closing_speed = half_step;
     history.closing_speed = half_step;
     typename Model::template Response<Pack> r;
     if constexpr (ledger) {
