@@ -39,12 +39,23 @@ struct Head {
   }
 };
 
-[[noreturn]] void fail(const Scene& scene, const std::string& sentence) { throw io::UserError(scene.start_from->where, sentence); }
-
-io::State read_file(const Scene& scene, io::CheckpointInfo& info) {
-  auto [state, found] = io::read_checkpoint(scene.start_from->file);
-  info = found;
-  return std::move(state);
+// The head of the checkpoint, its materials numbered as in the scene.
+Head read_head(const StartFrom& start, const Scene& scene, io::StateReader& reader) {
+  Head head;
+  reader("head", head);
+  if (head.dimension != scene.dimension)
+    throw io::UserError(start.where, fmt::format("start_from = \"{}\" holds particles of {} dimensions, and the case has {}.", start.file,
+                                                 head.dimension, scene.dimension));
+  head.particles.kind = {head.dimension, head.rotates};
+  for (auto& material : head.particles.material) {
+    const auto& name = head.materials[material];
+    const auto found = std::find_if(scene.materials.begin(), scene.materials.end(), [&](const Material& m) { return m.name == name; });
+    if (found == scene.materials.end())
+      throw io::UserError(start.where, fmt::format("start_from = \"{}\" holds particles of {}, which is not in {}.material. Add it.", start.file,
+                                                   name, scene.name));
+    material = static_cast<std::uint8_t>(found - scene.materials.begin());
+  }
+  return head;
 }
 
 }  // namespace
@@ -63,37 +74,41 @@ void write_checkpoint(const std::string& path, const Scene& scene, const Engine&
   io::write_checkpoint(path, state, {program_version, scene.name, engine.time(), 0, description(scene)});
 }
 
-Particles read_particles(const Scene& scene) {
-  io::CheckpointInfo info;
-  const auto state = read_file(scene, info);
-  Head head;
+std::vector<StartFrom::Content> contents_of(const StartFrom& start, const Scene& scene) {
+  const auto state = io::read_checkpoint(start.file).first;
   io::StateReader reader(state);
-  reader("head", head);
-  if (head.dimension != scene.dimension)
-    fail(scene, fmt::format("start_from = \"{}\" holds particles of {} dimensions, and the case has {}.", scene.start_from->file, head.dimension,
-                            scene.dimension));
+  const auto particles = read_head(start, scene, reader).particles;
+  std::vector<StartFrom::Content> contents;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const double radius = particles.radius_of(i);
+    auto content = std::find_if(contents.begin(), contents.end(), [&](const auto& c) { return c.material == particles.material[i]; });
+    if (content == contents.end()) content = contents.insert(contents.end(), {particles.material[i], 0, radius, radius});
+    ++content->count;
+    content->smallest_radius = std::min(content->smallest_radius, radius);
+    content->largest_radius = std::max(content->largest_radius, radius);
+  }
+  return contents;
+}
+
+Particles read_particles(const Scene& scene) {
+  const auto state = io::read_checkpoint(scene.start_from->file).first;
+  io::StateReader reader(state);
+  const auto old = read_head(*scene.start_from, scene, reader).particles;
   Particles particles;
   particles.kind = scene.kind();
-  auto& old = head.particles;
-  old.kind = {head.dimension, head.rotates};
   for (std::size_t i = 0; i < old.size(); ++i) {
-    const auto& name = head.materials[old.material[i]];
-    const auto found = std::find_if(scene.materials.begin(), scene.materials.end(), [&](const Material& m) { return m.name == name; });
-    if (found == scene.materials.end())
-      fail(scene, fmt::format("start_from = \"{}\" holds particles of {}, which is not in {}.material. Add it.", scene.start_from->file, name, scene.name));
-    particles.add(old.position[i].vector(), old.radius_of(i), found->density, static_cast<std::uint8_t>(found - scene.materials.begin()),
-                  old.velocity_of(i), old.spin_of(i));
+    particles.add(old.position[i].vector(), old.radius_of(i), scene.materials[old.material[i]].density, old.material[i], old.velocity_of(i),
+                  old.spin_of(i));
     particles.id.back() = old.id[i];
   }
-  particles.next_id = std::max(particles.next_id, old.next_id);
+  particles.next_id = old.next_id;
   return particles;
 }
 
 void read_state(const Scene& scene, Engine& engine, Traffic& traffic) {
-  io::CheckpointInfo info;
-  const auto state = read_file(scene, info);
+  const auto [state, info] = io::read_checkpoint(scene.start_from->file);
   if (info.program_version != program_version || info.case_hash != description(scene))
-    fail(scene, fmt::format("start_from = \"{}\" is the state of another scene ({} of {}): materials, laws, walls, partitions, inlets and the "
+    throw io::UserError(scene.start_from->where, fmt::format("start_from = \"{}\" is the state of another scene ({} of {}): materials, laws, walls, partitions, inlets and the "
                             "energy ledger must be the same to go on bit by bit. Use take = \"particles\".",
                             scene.start_from->file, info.participant, info.program_version));
   Head head;

@@ -11,8 +11,11 @@ namespace acopla::dem {
 /// Everything that a run needs to go on bit by bit.
 void write_checkpoint(const std::string& path, const Scene& scene, const Engine& engine, const Traffic& traffic);
 
-/// The particles of a checkpoint: places, sizes, materials by name, velocities; ids are kept. @throws io::UserError, located at
-/// start_from, when it is no checkpoint, of another dimension, or has a material the scene does not know
+/// What is in a checkpoint, by materials of the scene. @throws io::UserError, located at start_from, when it is no checkpoint, of another
+/// dimension, or has a material the scene does not know
+std::vector<StartFrom::Content> contents_of(const StartFrom& start, const Scene& scene);
+
+/// The particles of a checkpoint: places, sizes, materials by name, velocities; ids are kept.
 Particles read_particles(const Scene& scene);
 
 /// The whole state of a checkpoint into an engine of the same scene. @throws io::UserError when it is of another scene

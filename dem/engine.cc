@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <stdexcept>
 
@@ -53,6 +54,7 @@ void Engine::set_sizes() {
     smallest_ = std::min(smallest_, p.w);
     largest_ = std::max(largest_, p.w);
   }
+  one_material_ = std::adjacent_find(particles_.material.begin(), particles_.material.end(), std::not_equal_to<>()) == particles_.material.end();
   if (before != smallest_) {
     skin_ = 0.3 * smallest_;
     near_skin_ = 0.01 * smallest_;
@@ -103,6 +105,12 @@ void Engine::start() {
   for (auto& partition : partitions_) complete_forces(partition);
   started_ = true;
   if (keeps_ledger_) energy();
+}
+
+void Engine::restart_clock() {
+  time_ = 0;
+  ledger_ = {};
+  if (keeps_ledger_ && started_) energy();
 }
 
 void Engine::move(double kick, double step) {
@@ -247,7 +255,7 @@ void Engine::refresh(const SavedPairs* saved) {
   }
   team_.run(static_cast<unsigned>(partitions_.size()), [&](unsigned p) {
     auto& partition = partitions_[p];
-    partition.pairs.refresh(particles_, partition.rows, partition.first, partition.last, near_skin_, kernels_, saved);
+    partition.pairs.refresh(particles_, partition.rows, partition.first, partition.last, near_skin_, kernels_, one_material_, saved);
   });
   near_travel_ = 0;
   steps_since_refresh_ = 0;
@@ -374,7 +382,7 @@ StepRatio Engine::step_ratio(double step) const {
   for (const auto& partition : partitions_)
     partition.walls.for_each_contact([&](std::uint32_t i, std::uint8_t material, std::uint8_t wall, double overlap, const Vec3& normal,
                                          double curvature) { estimate.add_wall(i, overlap, normal, curvature, kernels_.of(material, wall)); });
-  return estimate.worst();
+  return estimate.ratio();
 }
 
 void Engine::check_domain() const {

@@ -44,10 +44,12 @@ class Engine {
   /// Takes out all particles for which `leaves` says so. @return their mass [kg]
   double remove(const std::function<bool(std::size_t)>& leaves);
   double time() const { return time_; }
+  /// Time and the energy ledger begin anew with the particles as they are.
+  void restart_clock();
 
   /// Contacts at the last step, particle–particle and particle–wall.
   std::size_t contact_count() const;
-  /// Δt over the limit (2/ω)(sqrt(1+ζ²) − ζ) of the worst particle (dem/stability.h), and who it is.
+  /// Δt over the stability limit of the contacts there are (StabilityEstimate::ratio), and who decides it.
   StepRatio step_ratio(double step) const;
   /// Deepest overlap over the smaller radius.
   double worst_overlap() const;
@@ -89,7 +91,10 @@ class Engine {
     archive("steps_since_rebuild", steps_since_rebuild_);
     archive("steps_since_refresh", steps_since_refresh_);
     archive("ledger", ledger_);
-    link_exports();
+    archive("smallest", smallest_);
+    archive("largest", largest_);
+    archive("one_material", one_material_);
+    if constexpr (Archive::reading) link_exports();
   }
 
  private:
@@ -158,6 +163,7 @@ class Engine {
   bool keeps_ledger_ = false, allow_unstable_ = false;
   double drift_limit_ = 0;
   double smallest_ = 0, largest_ = 0, time_ = 0;
+  bool one_material_ = true;  // of the particles
   bool started_ = false;
   bool outdated_ = true;  // particles came or went: the lists are void
 

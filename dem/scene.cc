@@ -11,6 +11,7 @@
 #include <set>
 
 #include "dem/contact/restitution.h"
+#include "dem/checkpoint.h"
 #include "dem/feeding/read.h"
 #include "dem/laws.h"
 #include "dem/wall/read.h"
@@ -19,6 +20,8 @@ namespace acopla::dem {
 
 std::size_t Scene::particle_count() const {
   std::size_t count = 0;
+  if (start_from)
+    for (const auto& content : start_from->contents) count += content.count;
   for (std::size_t k = 0; k < fillings.size(); ++k)
     count += fillings[k].placing == Placing::given ? fillings[k].particles.size() : radii_of(fillings[k], k, fill_settings()).size();
   return count;
@@ -31,6 +34,8 @@ std::vector<std::uint8_t> Scene::particle_materials() const {
     for (const auto& particle : filling.particles) used.insert(particle.material);
   }
   for (const auto& inlet : inlets) used.insert(inlet.material);
+  if (start_from)
+    for (const auto& content : start_from->contents) used.insert(content.material);
   return {used.begin(), used.end()};
 }
 
@@ -52,6 +57,9 @@ double Scene::smallest_radius(std::size_t material) const {
   }
   for (const auto& inlet : inlets)
     if (inlet.material == material) smallest = std::min(smallest, inlet.sizes.smallest_radius());
+  if (start_from)
+    for (const auto& content : start_from->contents)
+      if (content.material == material) smallest = std::min(smallest, content.smallest_radius);
   return std::isfinite(smallest) ? smallest : 0;
 }
 
@@ -59,6 +67,8 @@ double Scene::largest_radius() const {
   double largest = 0;
   for (const auto& filling : fillings) largest = std::max(largest, filling.largest_radius());
   for (const auto& inlet : inlets) largest = std::max(largest, inlet.sizes.largest_radius());
+  if (start_from)
+    for (const auto& content : start_from->contents) largest = std::max(largest, content.largest_radius);
   return largest;
 }
 
@@ -175,6 +185,7 @@ class Reader {
       }
       start.file = find_checkpoint(path);
       if (!scene_.fillings.empty()) table_.fail("start_from", "and insert are both given. Keep one.");
+      start.contents = contents_of(start, scene_);
       scene_.start_from = start;
     }
     if (table_.has("settle")) {

@@ -29,7 +29,14 @@ struct Material {
 
 /// Particles from the checkpoint of another run, in place of fillings.
 struct StartFrom {
+  /// Of one material.
+  struct Content {
+    std::uint8_t material = 0;
+    std::size_t count = 0;
+    double smallest_radius = 0, largest_radius = 0;  ///< [m]
+  };
   std::string file;      ///< a checkpoint
+  std::vector<Content> contents;
   bool whole = false;    ///< its whole state, histories and all: the same scene goes on bit by bit; else the particles alone
   io::Location where;
 };

@@ -59,17 +59,26 @@ std::vector<protocol::Surface> Solver::start(const protocol::Run& run) {
   // Forces on vertices are summed only for walls that somebody wants them of.
   for (const auto wall : sent_) walls.send(wall);
   auto particles = first_particles(walls);
-  if (scene_.settling) particles = settled(std::move(particles));
+  const auto by_itself = [](const Wall& wall) { return wall.motion.moves() && wall.motion.kind() != Motion::Kind::prescribed; };
+  const bool apart = scene_.settling && std::any_of(scene_.walls.begin(), scene_.walls.end(), by_itself);
+  if (apart) particles = settled_between_standing_walls(std::move(particles));
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses) surfaces.push_back({use.surface, walls.surface(wall_of(use.surface))});
   for (auto& wall : scene_.walls) wall.mesh = {};  // the engine has it now
   engine_ = make_engine(scene_, std::move(particles), std::move(walls));
+  if (scene_.settling && !apart) settle(*engine_);
   traffic_ = std::make_unique<Traffic>(scene_);
   if (scene_.start_from && scene_.start_from->whole) read_state(scene_, *engine_, *traffic_);
   if (!run.results.empty() && scene_.write_particles) {
     std::filesystem::create_directories(run.results);
     pictures_ = std::make_unique<io::PvdSeries>(fmt::format("{}/{}.pvd", run.results, scene_.name));
-    if (scene_.output_every > 0) write_particles(0);
+    for (std::size_t w = 0; w < scene_.walls.size(); ++w)
+      if (scene_.walls[w].motion.moves() && !scene_.walls[w].is_plane)
+        wall_pictures_.emplace_back(w, io::PvdSeries(fmt::format("{}/{}_{}.pvd", run.results, scene_.name, scene_.walls[w].name)));
+    if (scene_.output_every > 0) {
+      write_particles(0);
+      write_moving_walls(0);
+    }
   }
   next_picture_ = scene_.output_every;
   return surfaces;
@@ -80,29 +89,34 @@ Particles Solver::first_particles(const WallSet& walls) const {
   return insert_particles(scene_, walls);
 }
 
-// Runs the particles between walls that stand until they have come to rest.
-Particles Solver::settled(Particles particles) const {
+// Walls that move by themselves must not do so while the particles settle: those settle in a scene of their own, and begin here without
+// the springs of their contacts.
+Particles Solver::settled_between_standing_walls(Particles particles) const {
   auto scene = scene_;
   for (auto& wall : scene.walls) wall.motion = Motion();
   scene.keeps_ledger = false;
   const auto engine = make_engine(scene, std::move(particles));
-  double scale = 0;
-  for (std::size_t i = 0; i < engine->particles().size(); ++i)
-    scale += engine->particles().mass_of(i) * scene.gravity.norm() * engine->particles().radius_of(i);
+  settle(*engine);
+  return engine->particles();
+}
+
+void Solver::settle(Engine& engine) const {
   const auto& settling = *scene_.settling;
+  const double gravity = scene_.gravity.norm();
+  double scale = 0;  // Σ m g r
+  for (std::size_t i = 0; i < engine.particles().size(); ++i) scale += engine.particles().mass_of(i) * gravity * engine.particles().radius_of(i);
   // At rest twice in a row, a fall of one radius apart: nobody may be caught at the top of a flight.
-  const double radius = scene.largest_radius() > 0 ? scene.largest_radius() : std::sqrt(scale);
-  const double pause = std::sqrt(2 * radius / scene.gravity.norm());
+  const double pause = std::sqrt(2 * scene_.largest_radius() / gravity);
   const auto steps = static_cast<std::uint64_t>(std::max(1.0, std::ceil(pause / largest_step_)));
   for (int at_rest = 0; at_rest < 2;) {
-    engine->advance(steps, largest_step_);
-    at_rest = engine->kinetic_energy() < settling.kinetic_energy * scale ? at_rest + 1 : 0;
-    if (engine->time() > settling.limit)
+    engine.advance(steps, largest_step_);
+    at_rest = engine.kinetic_energy() < settling.kinetic_energy * scale ? at_rest + 1 : 0;
+    if (engine.time() > settling.limit && at_rest < 2)
       throw io::UserError(settling.where, fmt::format("the particles have not settled in {:.4g} s: their kinetic energy is {:.3g} of Σ m g r, and "
                                                       "kinetic_energy asks for {:.3g}. Raise limit, or add damping or rolling resistance.",
-                                                      settling.limit, engine->kinetic_energy() / scale, settling.kinetic_energy));
+                                                      settling.limit, engine.kinetic_energy() / scale, settling.kinetic_energy));
   }
-  return engine->particles();
+  engine.restart_clock();
 }
 
 protocol::Advance Solver::advance(const protocol::Window& window, const std::vector<protocol::Field>& received) {
@@ -163,11 +177,14 @@ void Solver::check_step(double step) {
   checked_at_ = steps_;
   const auto ratio = engine_->step_ratio(step);
   step_ratio_ = ratio.value;
-  if (ratio.value <= 1 || scene_.allow_unstable_step) return;
+  // A hard impact may pass the limit for some steps, in which nothing can grow; who is still beyond it two hundred steps later stays there.
+  const bool again = beyond_limit_;
+  beyond_limit_ = ratio.value > 1;
+  if (!beyond_limit_ || !again || scene_.allow_unstable_step) return;
   const Vec3 x = engine_->particles().position[ratio.particle].vector();
   throw std::runtime_error(fmt::format(
-      "the step of {:.4g} s may be unstable at t = {:.6g} s: it is {:.2f} of the bound for particle {} at ({:.4g}, {:.4g}, {:.4g}) m with the contacts "
-      "it has now. Lower {}, or say allow_unstable_step = true.",
+      "the step of {:.4g} s is unstable at t = {:.6g} s: it is {:.2f} of the limit of the contacts there are now, of which those of particle {} at "
+      "({:.4g}, {:.4g}, {:.4g}) m are the stiffest. Lower {}, or say allow_unstable_step = true.",
       step, engine_->time(), ratio.value, engine_->particles().id[ratio.particle], x[0], x[1], x[2], scene_.step ? "step" : "step_fraction"));
 }
 
@@ -222,7 +239,10 @@ void Solver::write_output(const protocol::Window& window) {
   const bool last = window.end >= run_.end;
   const bool due = scene_.output_every > 0 && window.end_time() >= next_picture_ * (1 - 1e-12);
   if (last || due) {
-    if (pictures_) write_particles(window.end_time());
+    if (pictures_) {
+      write_particles(window.end_time());
+      write_moving_walls(window.end_time());
+    }
     if (scene_.write_checkpoint && !run_.results.empty())
       write_checkpoint(fmt::format("{}/checkpoint.h5", run_.results), scene_, *engine_, *traffic_);
   }
@@ -243,6 +263,16 @@ void Solver::write_particles(double time) {
   const auto file = fmt::format("{}/{}_{:06}.vtp", run_.results, scene_.name, std::llround(time / run_.tick));
   io::write_points(file, points, {radius, velocity, speed, id});
   pictures_->add(time, file);
+}
+
+void Solver::write_moving_walls(double time) {
+  for (auto& [wall, series] : wall_pictures_) {
+    auto surface = engine_->walls().surface(wall);
+    surface.points = engine_->walls().positions(wall);
+    const auto file = fmt::format("{}/{}_{}_{:06}.vtp", run_.results, scene_.name, scene_.walls[wall].name, std::llround(time / run_.tick));
+    io::write_surface(file, surface, {});
+    series.add(time, file);
+  }
 }
 
 std::vector<std::pair<std::string, double>> Solver::finish() {

@@ -35,13 +35,15 @@ class Solver final : public protocol::Participant {
   void check_uses(const protocol::Run& run);
   std::size_t wall_of(const std::string& surface) const;
   Particles first_particles(const WallSet& walls) const;
-  Particles settled(Particles particles) const;
+  void settle(Engine& engine) const;
+  Particles settled_between_standing_walls(Particles particles) const;
   void prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received);
   void step_through(std::uint64_t steps, double step);
   void check_step(double step);
   std::vector<std::pair<std::string, double>> quantities(double step);
   void write_output(const protocol::Window& window);
   void write_particles(double time);
+  void write_moving_walls(double time);
 
   Scene scene_;
   double largest_step_;
@@ -53,9 +55,11 @@ class Solver final : public protocol::Participant {
   double saved_next_picture_ = 0;
   protocol::Run run_;
   std::unique_ptr<io::PvdSeries> pictures_;
+  std::vector<std::pair<std::size_t, io::PvdSeries>> wall_pictures_;  // of walls that move and have vertices
   double next_picture_ = 0;
   std::uint64_t steps_ = 0, checked_at_ = 0;
   double step_ratio_ = 0;
+  bool beyond_limit_ = false;  // at the last look
   std::size_t couples_lost_ = 0, triangles_dropped_ = 0;
   double seconds_ = 0;
   double last_step_ = 0, last_rate_ = 0;

@@ -77,7 +77,7 @@ void copy_history(const PairContacts& from, std::size_t a, PairContacts& to, std
 }  // namespace
 
 void TouchingPairs::refresh(const Particles& particles, const PairList& rows, std::uint32_t first, std::uint32_t last, double skin,
-                            const KernelTable& kernels, const SavedPairs* saved) {
+                            const KernelTable& kernels, bool one_material, const SavedPairs* saved) {
   groups_.resize(2 * kernels.kernel.size());
   groups_.swap(earlier_);
   groups_.resize(2 * kernels.kernel.size());
@@ -91,6 +91,7 @@ void TouchingPairs::refresh(const Particles& particles, const PairList& rows, st
     group.slot[group.size] = slot;
     group.size += touches;
   };
+  const std::size_t only = one_material && first < last ? 2u * kernels.group[particles.material[first] * (kernels.materials + 1)] : 0;
   for (std::uint32_t i = first; i < last; ++i) {
     const Record a = position[i];
     const double wide = a.w + skin;
@@ -102,8 +103,8 @@ void TouchingPairs::refresh(const Particles& particles, const PairList& rows, st
     };
     // Rows are ascending: the pairs of this partition come first.
     auto k = begin;
-    if (kernels.materials == 1) {
-      auto &own = groups_[0], &other = groups_[1];
+    if (one_material) {
+      auto &own = groups_[only], &other = groups_[only + 1];
       reserve(own, end - begin);
       for (; k < end && second[k] < last; ++k) append(own, i, second[k], k, touches(second[k]));
       reserve(other, end - k);

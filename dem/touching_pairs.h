@@ -38,8 +38,9 @@ class TouchingPairs {
  public:
   /// Finds the pairs anew. Their histories come from the present ones, or, where the list of neighbours is new, from `saved`.
   /// @param rows  neighbours of the particles first, first + 1, … last − 1
+  /// @param one_material  all particles of the scene are of one
   void refresh(const Particles& particles, const PairList& rows, std::uint32_t first, std::uint32_t last, double skin,
-               const KernelTable& kernels, const SavedPairs* saved);
+               const KernelTable& kernels, bool one_material, const SavedPairs* saved);
   /// Adds every history that is not zero.
   void save(SavedPairs& saved, const KernelTable& kernels) const;
   /// Forces of all pairs.

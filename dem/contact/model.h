@@ -20,6 +20,9 @@ struct ContactEnergy {
   Real tangential_work = Real(0);     ///< taken from the bodies by tangential forces in the last step [J]
   Real rolling_work = Real(0);        ///< taken from the bodies by rolling torques in the last step [J]
 
+  Real viscous = Real(0);        ///< normal force beside the elastic one [N]; of one contact
+  Real viscous_shear = Real(0);  ///< tangential dashpot times the whole tangential force [N²]; of one contact
+
   void add(const ContactEnergy& other) {
     normal += other.normal;
     tangential += other.tangential;
@@ -98,7 +101,8 @@ struct ContactModel {
     if (energy) {
       energy->normal = Normal::energy(k, p.normal, history.normal);
       const Real elastic = Normal::elastic_force(k, p.normal, history.normal);
-      energy->normal_dashpot = select(touches, (response.normal - elastic) * k.closing_speed, Real(0));
+      energy->viscous = select(touches, response.normal - elastic, Real(0));
+      energy->normal_dashpot = energy->viscous * k.closing_speed;
     }
     ShearSpring<Real> shear{Real(0), Real(1), Real(0)};
     if constexpr (has_friction) {
@@ -112,6 +116,7 @@ struct ContactModel {
         const auto& elastic = history.tangential.force;
         energy->tangential = select(shear.stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear.stiffness), Real(0));
         energy->tangential_work = -(Real(k.step) * dot(response.shear - elastic + Real(0.5) * (before + elastic), k.slip));
+        energy->viscous_shear = dot(response.shear - elastic, response.shear);
       }
     }
     if constexpr (has_rolling) {

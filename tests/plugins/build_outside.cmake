@@ -12,3 +12,4 @@ run(${CMAKE_COMMAND} -S ${AT}/libraries/outside -B ${AT}/build -G ${GENERATOR} -
     -DEXAMPLE=${AT}/example -DLIBRARIES=${AT}/libraries -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
     -DCMAKE_CXX_FLAGS=${FLAGS})
 run(${CMAKE_COMMAND} --build ${AT}/build)
+file(COPY ${AT}/build/libwalton_braun.so DESTINATION ${AT}/example/build)

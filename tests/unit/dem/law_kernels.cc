@@ -38,6 +38,18 @@ INSTANTIATE_TEST_SUITE_P(BuiltIn, Kernels, ::testing::Combine(::testing::ValuesI
                            return laws.normal + "_" + laws.tangential + "_" + laws.rolling + "_" + std::to_string(std::get<int>(instance.param)) + "d";
                          });
 
+TEST(Packs, AreLoadedFromAndStoredAtAnyAddress) {
+  // Regression: the compiler took the address for an aligned one; walls of glued particles then crashed, by the allocator's chance.
+  std::vector<double> numbers(3 * lanes), copy(3 * lanes);
+  for (std::size_t n = 0; n < numbers.size(); ++n) numbers[n] = static_cast<double>(n);
+  for (std::size_t at = 0; at < lanes; ++at) {
+    const double* from = &numbers[at];
+    asm volatile("" : "+r"(from));  // an address that the compiler knows nothing of
+    store(&copy[at], 2.0 * load(from));
+    for (std::size_t lane = 0; lane < lanes; ++lane) EXPECT_EQ(copy[at + lane], 2.0 * static_cast<double>(at + lane));
+  }
+}
+
 TEST(LawsTable, IsTheOneInTheDocs) {
   std::ifstream file(ACOPLA_SOURCE_DIR "/docs/laws.md");
   std::stringstream page;
