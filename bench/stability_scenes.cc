@@ -112,9 +112,10 @@ Bed squeezed_bed(Setting setting, int per_edge, double overlap, std::uint64_t se
   bed.side = std::max(std::pow(volume / (plane ? 0.8 : 0.55), 1.0 / setting.dimension), 2.5 * largest);
   for (auto& b : bed.bodies)
     for (int d = 0; d < setting.dimension; ++d) b.at[d] = largest + b.at[d] * (bed.side - 2 * largest);
-  // Strong damping: the packing slides down its energy.
+  // With strong damping the packing slides down its energy, until nobody moves a 1e-13th of its radius in a step.
   auto scene = scene_of(setting, bed.side);
   const double step = 0.2 * dem::critical_step(scene).seconds;
+  const double still = 1e-26 * volume * setting.species[0].density * std::pow(smallest / step, 2);
   for (int round = 0; round < 60; ++round) {
     // Far from rest it creeps; then it is damped as its slow modes are best.
     setting.more = fmt::format("damping = {{ viscous = {{ translation = {:.17g} }} }}\n", (round == 0 ? 0.5 : 0.03) / step);
@@ -122,8 +123,9 @@ Bed squeezed_bed(Setting setting, int per_edge, double overlap, std::uint64_t se
     const auto engine = engine_of(scene, bed.bodies, box(setting.dimension, bed.side));
     for (int chunk = 0; chunk < 40; ++chunk) {
       engine->advance(250, step);
-      if (engine->kinetic_energy() < 1e-24 * engine->mass() * std::pow(smallest / step, 2)) break;
+      if (engine->kinetic_energy() < still) break;
     }
+    bed.at_rest = engine->kinetic_energy() < still;
     take_positions(*engine, bed.bodies);
     bed.contacts = engine->contact_count();
     double sum = 0;
@@ -139,7 +141,10 @@ Bed squeezed_bed(Setting setting, int per_edge, double overlap, std::uint64_t se
       }
     bed.mean_overlap = count > bed.bodies.size() ? sum / static_cast<double>(count) : 0;
     const double short_of = overlap - bed.mean_overlap;
-    if (std::abs(short_of) < 0.2 * overlap) break;
+    if (std::abs(short_of) < 0.2 * overlap) {
+      if (bed.at_rest) break;
+      continue;
+    }
     const double shrink = 1 - 0.7 * std::clamp(short_of, -0.02, 0.02) * smallest / largest;
     bed.side *= shrink;
     for (auto& b : bed.bodies) b.at *= shrink;

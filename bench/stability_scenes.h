@@ -54,6 +54,7 @@ struct Bed {
   std::vector<Body> bodies;
   double side = 0, mean_overlap = 0;  ///< [m]; over the smaller radius
   std::size_t contacts = 0;
+  bool at_rest = false;
 };
 /// Packs `per_edge`^dimension particles (species in turn; radii ± 15 % where there is one only) and squeezes them until the mean overlap
 /// over the smaller radius is `overlap`, without friction. The law's normal part decides where they come to rest.

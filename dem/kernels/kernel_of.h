@@ -53,11 +53,14 @@ class KernelOf final : public Kernel {
       result.shear = Model::Tangential::template stiffness<typename Model::Normal>(k, parameters_.tangential, parameters_.normal);
       result.shear_dashpot = Model::Tangential::template dashpot<typename Model::Normal>(k, parameters_.tangential, parameters_.normal);
     }
-    if constexpr (Model::has_rolling)
+    if constexpr (Model::has_rolling) {
       if constexpr (requires { Model::Rolling::stiffness(k, result.shear, parameters_.rolling); }) {
         result.rolling = Model::Rolling::stiffness(k, result.shear, parameters_.rolling);
         result.rolling_dashpot = Model::Rolling::dashpot(k, result.shear, parameters_.rolling);
       }
+      if constexpr (requires { parameters_.rolling.twisting; }) result.twisting = parameters_.rolling.twisting;
+      if constexpr (requires { Model::Rolling::share; }) result.spin_share = Model::Rolling::share;
+    }
     return result;
   }
 
