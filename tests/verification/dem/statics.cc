@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "cases.h"
 #include "dem/step.h"
 #include "setup.h"
 
@@ -55,33 +56,13 @@ TEST(Column, PutWhereStaticsPutsItDoesNotMove) {
     }
 }
 
-// The dashpots of contacts with a small particle are small: a drag of 1000 m v takes the swings of the large ones, and nothing at rest.
-constexpr const char* settles = "damping = { viscous = { translation = 1000 } }";
-
 TEST(Column, PutTogetherTouchingComesToRestWhereStaticsSays) {
+  // Overlaps are of 1e-6 to 1e-5 m. A body creeps home until v Δt is less than the last digit of its place: 3e-18 m over some 1e-8 s
+  // against a drag of 1000 1/s leaves up to 1e-13 m.
   for (const auto& [name, radii] : columns())
-    for (const std::string law : {"linear", "hertz"}) {
-      const auto& expected = reference()["statics"]["values"]["column_" + name + "_" + law];
-      auto setup = resting(law, 0.1);
-      setup.radius = *std::min_element(radii.begin(), radii.end());
-      setup.more = settles;
-      const auto scene = scene_of(setup);
-      std::vector<Body> bodies;
-      double height = 0;
-      for (const double r : radii) {
-        bodies.push_back({Vec3(0, height + r, 0), r});
-        height += 2 * r;
-      }
-      const auto engine = engine_of(scene, bodies, {plane(Vec3::Zero(), Vec3::UnitY())});
-      const double step = 0.2 * critical_step(scene).seconds;
-      engine->advance(static_cast<std::uint64_t>(0.05 / step), step);
-      engine->advance(1, step);  // loads are means over a window
-      // Overlaps are of 1e-6 to 1e-5 m. A body creeps home until v Δt is less than the last digit of its place: 3e-18 m over some 1e-8 s
-      // against a drag of 1000 1/s leaves up to 1e-13 m.
-      for (std::uint32_t k = 0; k < radii.size(); ++k)
-        EXPECT_NEAR(position(*engine, k)[1], expected["centres"][k], 1e-13) << name << ", " << law << ", " << k;
-      EXPECT_NEAR(-engine->wall_load().walls[0].force[1] / expected["forces"][0].get<double>(), 1, 1e-7) << name << ", " << law;
-    }
+    for (const std::string law : {"linear", "hertz"})
+      for (const auto& figure : column(0.2, "column_" + name + "_" + law, radii).figures)
+        EXPECT_NEAR(figure.value, figure.reference, figure.name[0] == 'c' ? 1e-13 : 1e-7 * figure.scale) << name << ", " << law << ", " << figure.name;
 }
 
 TEST(Column, TowerOfAHundredStands) {
@@ -107,32 +88,12 @@ TEST(Column, TowerOfAHundredStands) {
 }
 
 TEST(Row, OfThreeSqueezedBetweenWallsCarriesOneForce) {
-  // 10:1:10 and 100:1:100, walls 1e-6 m too close: one force through all four contacts.
-  for (const std::string ratio : {"ratio_10", "ratio_100"})
-    for (const std::string law : {"linear", "hertz"}) {
-      const auto& expected = reference()["statics"]["values"]["row_" + ratio];
-      const double small = ratio == "ratio_10" ? 0.001 : 0.0001, r = 0.01, gap = expected["gap_between_walls"];
-      auto setup = resting(law, 0.1);
-      setup.gravity = Vec3::Zero();
-      setup.radius = small;
-      setup.more = settles;
-      const auto scene = scene_of(setup);
-      // The squeeze shared equally at first; the bodies find their places.
-      const double share = expected["squeeze"].get<double>() / 4;
-      const double a = r - share, b = a + r + small - share, c = b + small + r - share;
-      const auto engine = engine_of(scene, {{Vec3(a, 0, 0), r}, {Vec3(b, 0, 0), small}, {Vec3(c, 0, 0), r}},
-                                    {plane(Vec3::Zero(), Vec3::UnitX()), plane(Vec3(gap, 0, 0), -Vec3::UnitX())});
-      const double step = 0.2 * critical_step(scene).seconds;
-      engine->advance(static_cast<std::uint64_t>(0.05 / step), step);
-      engine->advance(1, step);
-      const double force = expected[law + "_force"];
-      // Forces are stiffness times differences of places, which come home to 1e-13 m (as above) of overlaps of 1e-7 m.
-      EXPECT_NEAR(-engine->wall_load().walls[0].force[0], force, 1e-6 * force) << ratio << ", " << law;
-      EXPECT_NEAR(engine->wall_load().walls[1].force[0], force, 1e-6 * force) << ratio << ", " << law;
-      const double overlap = r + small - (position(*engine, 1)[0] - position(*engine, 0)[0]);
-      const double exact = law == "linear" ? expected["linear_overlap"].get<double>() : expected["hertz_overlaps"][1].get<double>();
-      EXPECT_NEAR(overlap, exact, 1e-6 * exact) << ratio << ", " << law;
-    }
+  // 10:1:10 and 100:1:100, walls 1e-6 m too close: one force through all four contacts. Forces are stiffness times differences of places,
+  // which come home to 1e-13 m (as above) of overlaps of 1e-7 m.
+  for (const std::string ratio : {"row_ratio_10", "row_ratio_100"})
+    for (const std::string law : {"linear", "hertz"})
+      for (const auto& figure : squeezed_row(0.2, ratio, law).figures)
+        EXPECT_NEAR(figure.value, figure.reference, 1e-6 * figure.scale) << ratio << ", " << law << ", " << figure.name;
 }
 
 TEST(SizeRatio100, LargeBallRestsOnSmallOnesAndLeavesThemWithoutSticking) {
@@ -150,7 +111,7 @@ TEST(SizeRatio100, LargeBallRestsOnSmallOnesAndLeavesThemWithoutSticking) {
     for (int k = 0; k < 3; ++k)
       bodies.push_back({Vec3(away * std::cos(2 * M_PI * k / 3), small, away * std::sin(2 * M_PI * k / 3)), small});
     const std::vector<Wall> floor{plane(Vec3::Zero(), Vec3::UnitY())};
-    setup.more = settles;
+    setup.more = "damping = { viscous = { translation = 1000 } }";
     auto scene = scene_of(setup);
     const double step = 0.2 * critical_step(scene).seconds;
     const auto resting_ball = engine_of(scene, bodies, floor);
