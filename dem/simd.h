@@ -35,7 +35,7 @@ struct DoublePack {
   using Vector = double __attribute__((vector_size(8 * lanes)));
   Vector v;
   DoublePack() = default;
-  DoublePack(double all) : v(Vector{} + all) {}  // NOLINT: a scalar is meant to mix with vectors
+  DoublePack(double all) : v(every(all)) {}  // NOLINT: a scalar is meant to mix with vectors
   explicit DoublePack(const Vector& vector) : v(vector) {}
   double operator[](std::size_t lane) const { return v[lane]; }
 
@@ -47,6 +47,15 @@ struct DoublePack {
   friend MaskPack operator<(const DoublePack& a, const DoublePack& b) { return {a.v < b.v}; }
   friend MaskPack operator==(const DoublePack& a, const DoublePack& b) { return {a.v == b.v}; }
   friend MaskPack operator>(const DoublePack& a, const DoublePack& b) { return {a.v > b.v}; }
+
+ private:
+  static Vector every(double x) {
+#ifdef __AVX512F__
+    return Vector{x, x, x, x, x, x, x, x};
+#else
+    return Vector{x, x, x, x};
+#endif
+  }
 };
 
 /// Lane by lane: where the mask holds `yes`, else `no`. Both are computed.
@@ -131,34 +140,30 @@ inline RecordVector low_half(const Vector& v) { return static_cast<RecordVector>
 inline RecordVector high_half(const Vector& v) { return static_cast<RecordVector>(_mm512_extractf64x4_pd(static_cast<__m512d>(v), 1)); }
 #endif
 
-/// Calls action(lane, row) for the rows of the first `count` records.
-template <class Action>
-inline void for_each_row(const RecordPack& values, std::size_t count, Action&& action) {
-  const auto rows = transposed(values.x.v, values.y.v, values.z.v, values.w.v);
-  const Vector* row[4] = {&rows.x.v, &rows.y.v, &rows.z.v, &rows.w.v};
+/// The four rows of a pack, and each lane's record of them.
+struct Rows {
+  RecordPack rows;
+  explicit Rows(const RecordPack& values) : rows(transposed(values.x.v, values.y.v, values.z.v, values.w.v)) {}
 #ifdef __AVX512F__
-  if (count == lanes) {
-    action(0, low_half(rows.x.v));
-    action(1, low_half(rows.y.v));
-    action(2, low_half(rows.z.v));
-    action(3, low_half(rows.w.v));
-    action(4, high_half(rows.x.v));
-    action(5, high_half(rows.y.v));
-    action(6, high_half(rows.z.v));
-    action(7, high_half(rows.w.v));
-    return;
-  }
-  for (std::size_t lane = 0; lane < count; ++lane) action(lane, lane < 4 ? low_half(*row[lane]) : high_half(*row[lane - 4]));
+  static auto record(const Vector& low_and_high, bool high) { return high ? high_half(low_and_high) : low_half(low_and_high); }
 #else
-  if (count == lanes) {
-    action(0, rows.x.v);
-    action(1, rows.y.v);
-    action(2, rows.z.v);
-    action(3, rows.w.v);
+  static auto record(const Vector& row, bool) { return row; }
+#endif
+  auto operator[](std::size_t lane) const {
+    const auto& row = lane % 4 == 0 ? rows.x : lane % 4 == 1 ? rows.y : lane % 4 == 2 ? rows.z : rows.w;
+    return record(row.v, lane >= 4);
+  }
+};
+
+/// Calls action(lane) for the first `count` lanes; whole packs without a loop, so that all of it stays in registers.
+template <class Action>
+[[gnu::always_inline]] inline void for_each_lane(std::size_t count, Action&& action) {
+  if (count == lanes) [[likely]] {
+    action(0), action(1), action(2), action(3);
+    if constexpr (lanes == 8) action(4), action(5), action(6), action(7);
     return;
   }
-  for (std::size_t lane = 0; lane < count; ++lane) action(lane, *row[lane]);
-#endif
+  for (std::size_t lane = 0; lane < count; ++lane) action(lane);
 }
 
 }  // namespace simd
@@ -181,11 +186,13 @@ inline RecordPack loaded(const Record* records) {
 
 /// Adds to the records of the first `count` lanes, one after another, since lanes may share a record.
 inline void add_to(Record* records, const std::uint32_t* which, std::size_t count, const RecordPack& values) {
-  simd::for_each_row(values, count, [&](std::size_t lane, const auto& row) { as_vector(records[which[lane]]) += row; });
+  const simd::Rows rows(values);
+  simd::for_each_lane(count, [&](std::size_t lane) { as_vector(records[which[lane]]) += rows[lane]; });
 }
 /// Writes `count` records one after another.
 inline void write(Record* records, std::size_t count, const RecordPack& values) {
-  simd::for_each_row(values, count, [&](std::size_t lane, const auto& row) { as_vector(records[lane]) = row; });
+  const simd::Rows rows(values);
+  simd::for_each_lane(count, [&](std::size_t lane) { as_vector(records[lane]) = rows[lane]; });
 }
 
 }  // namespace acopla::dem
