@@ -72,7 +72,13 @@ std::vector<protocol::Surface> Solver::start(const protocol::Run& run) {
   if (!run.results.empty() && scene_.write_particles) {
     std::filesystem::create_directories(run.results);
     pictures_ = std::make_unique<io::PvdSeries>(fmt::format("{}/{}.pvd", run.results, scene_.name));
-    if (scene_.output_every > 0) write_particles(0);
+    for (std::size_t w = 0; w < scene_.walls.size(); ++w)
+      if (scene_.walls[w].motion.moves() && !scene_.walls[w].is_plane)
+        wall_pictures_.emplace_back(w, io::PvdSeries(fmt::format("{}/{}_{}.pvd", run.results, scene_.name, scene_.walls[w].name)));
+    if (scene_.output_every > 0) {
+      write_particles(0);
+      write_moving_walls(0);
+    }
   }
   next_picture_ = scene_.output_every;
   return surfaces;
@@ -233,7 +239,10 @@ void Solver::write_output(const protocol::Window& window) {
   const bool last = window.end >= run_.end;
   const bool due = scene_.output_every > 0 && window.end_time() >= next_picture_ * (1 - 1e-12);
   if (last || due) {
-    if (pictures_) write_particles(window.end_time());
+    if (pictures_) {
+      write_particles(window.end_time());
+      write_moving_walls(window.end_time());
+    }
     if (scene_.write_checkpoint && !run_.results.empty())
       write_checkpoint(fmt::format("{}/checkpoint.h5", run_.results), scene_, *engine_, *traffic_);
   }
@@ -254,6 +263,16 @@ void Solver::write_particles(double time) {
   const auto file = fmt::format("{}/{}_{:06}.vtp", run_.results, scene_.name, std::llround(time / run_.tick));
   io::write_points(file, points, {radius, velocity, speed, id});
   pictures_->add(time, file);
+}
+
+void Solver::write_moving_walls(double time) {
+  for (auto& [wall, series] : wall_pictures_) {
+    auto surface = engine_->walls().surface(wall);
+    surface.points = engine_->walls().positions(wall);
+    const auto file = fmt::format("{}/{}_{}_{:06}.vtp", run_.results, scene_.name, scene_.walls[wall].name, std::llround(time / run_.tick));
+    io::write_surface(file, surface, {});
+    series.add(time, file);
+  }
 }
 
 std::vector<std::pair<std::string, double>> Solver::finish() {

@@ -43,6 +43,7 @@ class Solver final : public protocol::Participant {
   std::vector<std::pair<std::string, double>> quantities(double step);
   void write_output(const protocol::Window& window);
   void write_particles(double time);
+  void write_moving_walls(double time);
 
   Scene scene_;
   double largest_step_;
@@ -54,6 +55,7 @@ class Solver final : public protocol::Participant {
   double saved_next_picture_ = 0;
   protocol::Run run_;
   std::unique_ptr<io::PvdSeries> pictures_;
+  std::vector<std::pair<std::size_t, io::PvdSeries>> wall_pictures_;  // of walls that move and have vertices
   double next_picture_ = 0;
   std::uint64_t steps_ = 0, checked_at_ = 0;
   double step_ratio_ = 0;

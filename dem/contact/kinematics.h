@@ -28,7 +28,6 @@ struct Kinematics {
 
   Real overlap;                      ///< r_i + r_j − d, or r − d at a wall [m], ≥ 0
   Real closing_speed;                ///< > 0 while the bodies approach, at the whole step [m/s]
-  Real half_step_closing_speed;      ///< the same at the half step before; only the energy ledger asks for it
   Real reduced_radius;               ///< 1 / (1/r_i + 1/r_j); r_i at a wall [m]
   Real reduced_mass;                 ///< 1 / (1/m_i + 1/m_j); m_i at a wall [kg]
   Vector<Real, dimension> normal;    ///< unit

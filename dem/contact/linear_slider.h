@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 #include "dem/contact/linear.h"
 #include "dem/contact/slider.h"
@@ -11,15 +12,18 @@ namespace acopla::dem {
 struct LinearSlider {
   static constexpr const char* name = "linear_slider";
   static constexpr bool needs_moduli = false;
-  static constexpr std::array fields{Field{"ratio", "", io::positive, 20, "k_n / k_t"}};
+  static constexpr std::array fields{
+      Field{"ratio", "", io::positive, 20, "k_n / k_t"},
+      Field{"damping_ratio", "", io::non_negative, Field::optional,
+            "tangential dashpot over 2 sqrt(k_t m*); the normal dashpot's ratio unless given. Gomes's eq. 2.98 for discs: 1/sqrt(2) of his"}};
   struct Parameters {
     double inverse_ratio;  ///< k_t / k_n
     double dashpot;        ///< c_t over sqrt(k_n m*): 2 ζ sqrt(k_t/k_n)
     double friction;       ///< μ
   };
   static Parameters from(const PairProperties& pair) {
-    const double inverse = 1 / pair.tangential_values[0];
-    return {inverse, 2 * pair.damping_ratio * std::sqrt(inverse), pair.friction};
+    const double inverse = 1 / pair.tangential_values[0], own = pair.tangential_values[1];
+    return {inverse, 2 * (std::isnan(own) ? pair.damping_ratio : own) * std::sqrt(inverse), pair.friction};
   }
 
   /// Elastic force on i [N].

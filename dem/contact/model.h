@@ -20,6 +20,9 @@ struct ContactEnergy {
   Real tangential_work = Real(0);     ///< taken from the bodies by tangential forces in the last step [J]
   Real rolling_work = Real(0);        ///< taken from the bodies by rolling torques in the last step [J]
 
+  Real viscous = Real(0);        ///< normal force beside the elastic one [N]; of one contact
+  Real viscous_shear = Real(0);  ///< tangential dashpot times the whole tangential force [N²]; of one contact
+
   void add(const ContactEnergy& other) {
     normal += other.normal;
     tangential += other.tangential;
@@ -98,10 +101,8 @@ struct ContactModel {
     if (energy) {
       energy->normal = Normal::energy(k, p.normal, history.normal);
       const Real elastic = Normal::elastic_force(k, p.normal, history.normal);
-      // A force works over the mean of the half steps before and after it, and the one after it is slower by F Δt/m*: the other forces
-      // on the two bodies are left out here, but where they balance this one nothing is lost either.
-      const Real speed = k.half_step_closing_speed - (0.5 * k.step) * response.normal / k.reduced_mass;
-      energy->normal_dashpot = select(touches, (response.normal - elastic) * speed, Real(0));
+      energy->viscous = select(touches, response.normal - elastic, Real(0));
+      energy->normal_dashpot = energy->viscous * k.closing_speed;
     }
     ShearSpring<Real> shear{Real(0), Real(1), Real(0)};
     if constexpr (has_friction) {
@@ -114,10 +115,8 @@ struct ContactModel {
         // The spring's mean over the step, and its dashpot: with x_n − x_{n−1} = Δt v_{n−½} the spring's part is exact.
         const auto& elastic = history.tangential.force;
         energy->tangential = select(shear.stiffness > Real(0), dot(elastic, elastic) / (Real(2) * shear.stiffness), Real(0));
-        // The dashpot works over the mean slip like that of the normal direction; 1 + m r²/I of a disc and a sphere.
-        constexpr double turning = K::dimension == 2 ? 3 : 3.5;
-        const auto slip = k.slip + (turning * 0.5 * k.step / k.reduced_mass) * response.shear;
-        energy->tangential_work = -(Real(k.step) * (Real(0.5) * dot(before + elastic, k.slip) + dot(response.shear - elastic, slip)));
+        energy->tangential_work = -(Real(k.step) * dot(response.shear - elastic + Real(0.5) * (before + elastic), k.slip));
+        energy->viscous_shear = dot(response.shear - elastic, response.shear);
       }
     }
     if constexpr (has_rolling) {

@@ -32,7 +32,7 @@ inline PairProperties soft_glass() {
   pair.friction = 0.3;
   pair.rolling_friction = 0.05;
   pair.normal_values = {1e4, 2e3};
-  pair.tangential_values = {3.5};
+  pair.tangential_values = {3.5, std::nan("")};
   pair.rolling_values = {0.3, 1.2, 0.4};
   return pair;
 }

@@ -101,7 +101,7 @@ inline PairProperties glass(double restitution_damping = 0.3) {
   pair.hertz_damping = pair.damping_ratio = restitution_damping;
   pair.friction = 0.5;
   pair.rolling_friction = 0.2;
-  pair.tangential_values = {20};
+  pair.tangential_values = {20, std::nan("")};
   return pair;
 }
 
