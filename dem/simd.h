@@ -12,17 +12,19 @@
 
 #include "dem/particles.h"
 
-#ifdef __AVX__
+#ifdef __SSE2__
 #include <immintrin.h>
 #endif
 
 namespace acopla::dem {
 
 /// Contacts of a pack.
-#ifdef __AVX512F__
+#if defined(__AVX512F__)
 inline constexpr std::size_t lanes = 8;
-#else
+#elif defined(__AVX__)
 inline constexpr std::size_t lanes = 4;
+#else  // GCC takes the comparisons and shuffles of a pack wider than a register apart, number by number
+inline constexpr std::size_t lanes = 2;
 #endif
 
 struct MaskPack {
@@ -35,7 +37,14 @@ struct DoublePack {
   using Vector = double __attribute__((vector_size(8 * lanes)));
   Vector v;
   DoublePack() = default;
-  DoublePack(double all) : v(Vector{} + all) {}  // NOLINT: a scalar is meant to mix with vectors
+  // NOLINTNEXTLINE: a scalar is meant to mix with vectors
+#if defined(__AVX512F__)
+  DoublePack(double all) : v{all, all, all, all, all, all, all, all} {}
+#elif defined(__AVX__)
+  DoublePack(double all) : v{all, all, all, all} {}
+#else
+  DoublePack(double all) : v{all, all} {}
+#endif
   explicit DoublePack(const Vector& vector) : v(vector) {}
   double operator[](std::size_t lane) const { return v[lane]; }
 
@@ -61,6 +70,8 @@ inline DoublePack sqrt(const DoublePack& a) {
   return DoublePack(static_cast<DoublePack::Vector>(_mm512_sqrt_pd(static_cast<__m512d>(a.v))));
 #elif defined(__AVX__)
   return DoublePack(static_cast<DoublePack::Vector>(_mm256_sqrt_pd(static_cast<__m256d>(a.v))));
+#elif defined(__SSE2__)
+  return DoublePack(static_cast<DoublePack::Vector>(_mm_sqrt_pd(static_cast<__m128d>(a.v))));
 #else
   DoublePack root;
   for (std::size_t lane = 0; lane < lanes; ++lane) root.v[lane] = std::sqrt(a.v[lane]);
@@ -105,6 +116,7 @@ namespace simd {
 
 using Vector = DoublePack::Vector;
 
+#ifdef __AVX__
 /// Four rows, one a record (of eight lanes: a record in either half), from and to four components. Its own inverse.
 inline RecordPack transposed(const Vector& a, const Vector& b, const Vector& c, const Vector& d) {
 #ifdef __AVX512F__
@@ -121,6 +133,7 @@ inline RecordPack transposed(const Vector& a, const Vector& b, const Vector& c, 
           DoublePack(__builtin_shufflevector(ab_even, cd_even, 2, 3, 6, 7)), DoublePack(__builtin_shufflevector(ab_odd, cd_odd, 2, 3, 6, 7))};
 #endif
 }
+#endif
 
 #ifdef __AVX512F__
 // By intrinsics: GCC 12 takes the general shuffle of two halves through memory.
@@ -131,45 +144,84 @@ inline RecordVector low_half(const Vector& v) { return static_cast<RecordVector>
 inline RecordVector high_half(const Vector& v) { return static_cast<RecordVector>(_mm512_extractf64x4_pd(static_cast<__m512d>(v), 1)); }
 #endif
 
-/// Calls action(lane, row) for the rows of the first `count` records.
-template <class Action>
-inline void for_each_row(const RecordPack& values, std::size_t count, Action&& action) {
-  const auto rows = transposed(values.x.v, values.y.v, values.z.v, values.w.v);
-  const Vector* row[4] = {&rows.x.v, &rows.y.v, &rows.z.v, &rows.w.v};
-#ifdef __AVX512F__
-  if (count == lanes) {
-    action(0, low_half(rows.x.v));
-    action(1, low_half(rows.y.v));
-    action(2, low_half(rows.z.v));
-    action(3, low_half(rows.w.v));
-    action(4, high_half(rows.x.v));
-    action(5, high_half(rows.y.v));
-    action(6, high_half(rows.z.v));
-    action(7, high_half(rows.w.v));
-    return;
-  }
-  for (std::size_t lane = 0; lane < count; ++lane) action(lane, lane < 4 ? low_half(*row[lane]) : high_half(*row[lane - 4]));
-#else
-  if (count == lanes) {
-    action(0, rows.x.v);
-    action(1, rows.y.v);
-    action(2, rows.z.v);
-    action(3, rows.w.v);
-    return;
-  }
-  for (std::size_t lane = 0; lane < count; ++lane) action(lane, *row[lane]);
+#ifndef __AVX__
+/// A record in two registers.
+using HalfRecord = double __attribute__((vector_size(16), may_alias));
+struct Halves {
+  HalfRecord low, high;
+};
+inline const HalfRecord* halves(const Record& record) { return reinterpret_cast<const HalfRecord*>(&record); }
+inline HalfRecord* halves(Record& record) { return reinterpret_cast<HalfRecord*>(&record); }
+inline void add(Record& record, const Halves& row) {
+  halves(record)[0] += row.low;
+  halves(record)[1] += row.high;
+}
+inline void put(Record& record, const Halves& row) {
+  halves(record)[0] = row.low;
+  halves(record)[1] = row.high;
+}
 #endif
+inline void add(Record& record, const RecordVector& row) { as_vector(record) += row; }
+inline void put(Record& record, const RecordVector& row) { as_vector(record) = row; }
+
+/// A pack as one record a lane.
+class Rows {
+ public:
+#ifdef __AVX__
+  explicit Rows(const RecordPack& values) : rows_(transposed(values.x.v, values.y.v, values.z.v, values.w.v)) {}
+#else
+  explicit Rows(const RecordPack& p)
+      : row_{{__builtin_shufflevector(p.x.v, p.y.v, 0, 2), __builtin_shufflevector(p.z.v, p.w.v, 0, 2)},
+             {__builtin_shufflevector(p.x.v, p.y.v, 1, 3), __builtin_shufflevector(p.z.v, p.w.v, 1, 3)}} {}
+#endif
+  /// @param use  called with the record of that lane, as add() and put() take it
+  template <class Use>
+  [[gnu::always_inline]] void of(std::size_t lane, Use&& use) const {
+#ifdef __AVX__
+    const Vector& row = (lane % 4 == 0 ? rows_.x : lane % 4 == 1 ? rows_.y : lane % 4 == 2 ? rows_.z : rows_.w).v;
+#ifdef __AVX512F__
+    use(lane < 4 ? low_half(row) : high_half(row));
+#else
+    use(row);
+#endif
+#else
+    use(row_[lane]);
+#endif
+  }
+
+ private:
+#ifdef __AVX__
+  RecordPack rows_;
+#else
+  Halves row_[2];
+#endif
+};
+
+/// Calls action(lane) for the first `count` lanes; whole packs without a loop, so that all of it stays in registers.
+template <class Action>
+[[gnu::always_inline]] inline void for_each_lane(std::size_t count, Action&& action) {
+  if (count == lanes) [[likely]] {
+    action(0), action(1);
+    if constexpr (lanes >= 4) action(2), action(3);
+    if constexpr (lanes == 8) action(4), action(5), action(6), action(7);
+    return;
+  }
+  for (std::size_t lane = 0; lane < count; ++lane) action(lane);
 }
 
 }  // namespace simd
 
 inline RecordPack gathered(const Record* records, const std::uint32_t* which) {
-#ifdef __AVX512F__
+#if defined(__AVX512F__)
   using simd::joined;
   return simd::transposed(joined(records[which[0]], records[which[4]]), joined(records[which[1]], records[which[5]]),
                           joined(records[which[2]], records[which[6]]), joined(records[which[3]], records[which[7]]));
-#else
+#elif defined(__AVX__)
   return simd::transposed(as_vector(records[which[0]]), as_vector(records[which[1]]), as_vector(records[which[2]]), as_vector(records[which[3]]));
+#else
+  const auto *a = simd::halves(records[which[0]]), *b = simd::halves(records[which[1]]);
+  return {DoublePack(__builtin_shufflevector(a[0], b[0], 0, 2)), DoublePack(__builtin_shufflevector(a[0], b[0], 1, 3)),
+          DoublePack(__builtin_shufflevector(a[1], b[1], 0, 2)), DoublePack(__builtin_shufflevector(a[1], b[1], 1, 3))};
 #endif
 }
 
@@ -181,11 +233,13 @@ inline RecordPack loaded(const Record* records) {
 
 /// Adds to the records of the first `count` lanes, one after another, since lanes may share a record.
 inline void add_to(Record* records, const std::uint32_t* which, std::size_t count, const RecordPack& values) {
-  simd::for_each_row(values, count, [&](std::size_t lane, const auto& row) { as_vector(records[which[lane]]) += row; });
+  const simd::Rows rows(values);
+  simd::for_each_lane(count, [&](std::size_t lane) { rows.of(lane, [&](const auto& row) { simd::add(records[which[lane]], row); }); });
 }
 /// Writes `count` records one after another.
 inline void write(Record* records, std::size_t count, const RecordPack& values) {
-  simd::for_each_row(values, count, [&](std::size_t lane, const auto& row) { as_vector(records[lane]) = row; });
+  const simd::Rows rows(values);
+  simd::for_each_lane(count, [&](std::size_t lane) { rows.of(lane, [&](const auto& row) { simd::put(records[lane], row); }); });
 }
 
 }  // namespace acopla::dem

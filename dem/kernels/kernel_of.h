@@ -145,7 +145,8 @@ class KernelOf final : public Kernel {
     total.rolling_work += sum(weight * pack.rolling_work);
   }
   template <bool ledger>
-  typename Model::template Response<Pack> answer(Pack& k, HistoryLane* stored, const DoublePack& weight, ContactEnergy<double>* total) const {
+  static typename Model::template Response<Pack> answer(Pack& k, const typename Model::Parameters& parameters, HistoryLane* stored, const DoublePack& weight,
+                                                        ContactEnergy<double>* total) {
     History& history = *reinterpret_cast<History*>(stored);
     const DoublePack half_step = k.closing_speed, before = history.closing_speed;
     k.closing_speed = select(before == DoublePack(0.0), half_step, 1.5 * half_step - 0.5 * before);
@@ -153,7 +154,7 @@ class KernelOf final : public Kernel {
     typename Model::template Response<Pack> r;
     if constexpr (ledger) {
       ContactEnergy<DoublePack> energy;
-      r = Model::respond(k, parameters_, history, &energy);
+      r = Model::respond(k, parameters, history, &energy);
       // A force works over the mean of the half steps before and after it, and what is after it is slower by F Δt/m*. The other forces on
       // the two bodies are left out here, but where they balance this one no dashpot works. 1 + m r²/I is 3 for discs, 3.5 for spheres.
       constexpr double turning = dimension == 2 ? 3 : 3.5;
@@ -162,67 +163,95 @@ class KernelOf final : public Kernel {
       energy.tangential_work = energy.tangential_work - (k.step * turning) * late * energy.viscous_shear;
       add(*total, energy, weight);
     } else {
-      r = Model::respond(k, parameters_, history, static_cast<ContactEnergy<DoublePack>*>(nullptr));
+      r = Model::respond(k, parameters, history, static_cast<ContactEnergy<DoublePack>*>(nullptr));
     }
     keep_while_touching(stored, k);
     return r;
   }
 
-  template <bool ledger>
-  ACOPLA_ONE_BODY void all_pairs(PairContacts& contacts, Particles& particles, Exports& exports, double step, ContactEnergy<double>* energy) const {
+  // A pack of pairs before its law is asked.
+  struct Meeting {
+    Pack kinematics;
+    DoublePack arm_i, arm_j;  // from the centres to the contact point
+  };
+
+  static void meet(const Particles& particles, const std::uint32_t* i, const std::uint32_t* j, double step, Meeting& meeting) {
     using std::max, std::sqrt;
-    for (std::size_t c = 0; c < contacts.size; c += lanes) {
-      const auto count = std::min(lanes, contacts.size - c);
-      const std::uint32_t *i = &contacts.i[c], *j = &contacts.j[c];
-      const Body a = body(particles, i), b = body(particles, j);
-      Pack k;
-      k.step = step;
-      Vector<DoublePack, dimension> between;
-      if constexpr (dimension == 2) between = {a.position.x - b.position.x, a.position.y - b.position.y};
-      else between = {a.position.x - b.position.x, a.position.y - b.position.y, a.position.z - b.position.z};
-      const DoublePack distance = sqrt(dot(between, between));
-      const DoublePack radii = a.position.w + b.position.w, masses = a.velocity.w + b.velocity.w;
-      // One division for three quotients: 1/d, r r/(r + r), m m/(m + m).
-      const DoublePack sums = radii * masses, inverse = 1.0 / (distance * sums), inverse_sums = distance * inverse;
-      k.normal = (sums * inverse) * between;
-      k.overlap = max(DoublePack(0.0), radii - distance);
-      k.reduced_radius = a.position.w * b.position.w * masses * inverse_sums;
-      k.reduced_mass = a.velocity.w * b.velocity.w * radii * inverse_sums;
-      const auto relative = velocity_of(a) - velocity_of(b);
-      const DoublePack along = dot(relative, k.normal);
-      k.closing_speed = -along;
-      const DoublePack arm_i = a.position.w - 0.5 * k.overlap, arm_j = b.position.w - 0.5 * k.overlap;  // both end at the contact point
-      if constexpr (Model::rotates) {
-        const Turn spin_i = spin_of(a), spin_j = spin_of(b);
-        k.slip = slip(relative, along, arm_i * spin_i + arm_j * spin_j, k.normal);
-        k.mean_spin = DoublePack(0.5) * (spin_i + spin_j);
+    const Body a = body(particles, i), b = body(particles, j);
+    Pack k;
+    k.step = step;
+    Vector<DoublePack, dimension> between;
+    if constexpr (dimension == 2) between = {a.position.x - b.position.x, a.position.y - b.position.y};
+    else between = {a.position.x - b.position.x, a.position.y - b.position.y, a.position.z - b.position.z};
+    const DoublePack distance = sqrt(dot(between, between));
+    const DoublePack radii = a.position.w + b.position.w, masses = a.velocity.w + b.velocity.w;
+    // One division for three quotients: 1/d, r r/(r + r), m m/(m + m).
+    const DoublePack sums = radii * masses, inverse = 1.0 / (distance * sums), inverse_sums = distance * inverse;
+    k.normal = (sums * inverse) * between;
+    k.overlap = max(DoublePack(0.0), radii - distance);
+    k.reduced_radius = a.position.w * b.position.w * masses * inverse_sums;
+    k.reduced_mass = a.velocity.w * b.velocity.w * radii * inverse_sums;
+    const auto relative = velocity_of(a) - velocity_of(b);
+    const DoublePack along = dot(relative, k.normal);
+    k.closing_speed = -along;
+    meeting.arm_i = a.position.w - 0.5 * k.overlap;
+    meeting.arm_j = b.position.w - 0.5 * k.overlap;
+    if constexpr (Model::rotates) {
+      const Turn spin_i = spin_of(a), spin_j = spin_of(b);
+      k.slip = slip(relative, along, meeting.arm_i * spin_i + meeting.arm_j * spin_j, k.normal);
+      k.mean_spin = DoublePack(0.5) * (spin_i + spin_j);
+      if constexpr (Model::has_rolling) {
         k.relative_spin = spin_i - spin_j;
-        if constexpr (Model::has_rolling) set_inertias(k, a, b);
-      }
-      HistoryLane* const stored = &contacts.history[c / lanes * numbers];
-      const auto r = answer<ledger>(k, stored, ledger ? first_lanes(count) : DoublePack(1.0), energy);
-      const auto force = force_of(r, k.normal);
-      Turn on_i, on_j;
-      if constexpr (Model::rotates) {
-        const Turn turning = turning_of(r, k.normal);
-        on_i = -(arm_i * turning);
-        on_j = -(arm_j * turning);
-        if constexpr (Model::has_rolling) {
-          on_i = on_i + r.torque;
-          on_j = on_j - r.torque;
-        }
-      } else {
-        on_i = on_j = zero_vector<DoublePack, Pack::turns>();
-      }
-      add_to(particles.force.data(), i, count, with_torque(force, on_i));
-      if (contacts.exports) write(&exports.force[contacts.first_export + c], count, with_torque(-force, on_j));
-      else add_to(particles.force.data(), j, count, with_torque(-force, on_j));
-      if constexpr (dimension == 3 && Model::rotates) {
-        add_to(particles.torque.data(), i, count, record_of(on_i));
-        if (contacts.exports) write(&exports.torque[contacts.first_export + c], count, record_of(on_j));
-        else add_to(particles.torque.data(), j, count, record_of(on_j));
+        set_inertias(k, a, b);
       }
     }
+    meeting.kinematics = k;
+  }
+
+  // Some packs meet before the first is answered. A pack is one long chain of roots and quotients, and the processor cannot look far enough
+  // ahead to begin the next one meanwhile; the shorter chains of either half overlap.
+  static constexpr std::size_t ahead = 8;
+
+  template <bool ledger>
+  ACOPLA_ONE_BODY void all_pairs(PairContacts& contacts, Particles& particles, Exports& exports, double step, ContactEnergy<double>* energy) const {
+    const auto parameters = parameters_;  // a copy, which nothing that is written can change
+    Meeting meetings[ahead];
+    for (std::size_t begin = 0; begin < contacts.size; begin += ahead * lanes) {
+      const auto end = std::min(begin + ahead * lanes, contacts.size);
+      for (std::size_t c = begin; c < end; c += lanes) meet(particles, &contacts.i[c], &contacts.j[c], step, meetings[(c - begin) / lanes]);
+      for (std::size_t c = begin; c < end; c += lanes) {
+        Meeting& meeting = meetings[(c - begin) / lanes];
+        const auto count = std::min(lanes, contacts.size - c);
+        HistoryLane* const stored = &contacts.history[c / lanes * numbers];
+        Pack k = meeting.kinematics;
+        const auto r = answer<ledger>(k, parameters, stored, ledger ? first_lanes(count) : DoublePack(1.0), energy);
+        const auto force = force_of(r, k.normal);
+        Turn on_i, on_j;
+        if constexpr (Model::rotates) {
+          const Turn turning = turning_of(r, k.normal);
+          on_i = -(meeting.arm_i * turning);
+          on_j = -(meeting.arm_j * turning);
+          if constexpr (Model::has_rolling) {
+            on_i = on_i + r.torque;
+            on_j = on_j - r.torque;
+          }
+        } else {
+          on_i = on_j = zero_vector<DoublePack, Pack::turns>();
+        }
+        add_forces(particles, &contacts.i[c], count, force, on_i);
+        if (!contacts.exports) add_forces(particles, &contacts.j[c], count, -force, on_j);
+        else hand_over(exports, contacts.first_export + c, count, -force, on_j);
+      }
+    }
+  }
+
+  static void add_forces(Particles& particles, const std::uint32_t* which, std::size_t count, const Vector<DoublePack, dimension>& force, const Turn& torque) {
+    add_to(particles.force.data(), which, count, with_torque(force, torque));
+    if constexpr (dimension == 3 && Model::rotates) add_to(particles.torque.data(), which, count, record_of(torque));
+  }
+  static void hand_over(Exports& exports, std::size_t first, std::size_t count, const Vector<DoublePack, dimension>& force, const Turn& torque) {
+    write(&exports.force[first], count, with_torque(force, torque));
+    if constexpr (dimension == 3 && Model::rotates) write(&exports.torque[first], count, record_of(torque));
   }
 
   static void set_inertias(Pack& k, const Body& a, const Body& b) {
@@ -235,6 +264,7 @@ class KernelOf final : public Kernel {
   template <bool ledger>
   ACOPLA_ONE_BODY void all_walls(WallContacts& contacts, Particles& particles, double step, ContactEnergy<double>* energy) const {
     using std::max;
+    const auto parameters = parameters_;
     for (std::size_t c = 0; c < contacts.size; c += lanes) {
       const auto count = std::min(lanes, contacts.size - c);
       const std::uint32_t* i = &contacts.particle[c];
@@ -276,7 +306,7 @@ class KernelOf final : public Kernel {
         }
       }
       HistoryLane* const stored = &contacts.history[c / lanes * numbers];
-      const auto r = answer<ledger>(k, stored, ledger ? wall.w * first_lanes(count) : DoublePack(1.0), energy);
+      const auto r = answer<ledger>(k, parameters, stored, ledger ? wall.w * first_lanes(count) : DoublePack(1.0), energy);
       const auto force = wall.w * force_of(r, k.normal);
       Turn torque = zero_vector<DoublePack, Pack::turns>();
       if constexpr (Model::rotates) torque = -((wall.w * arm) * turning_of(r, k.normal));
@@ -286,8 +316,7 @@ class KernelOf final : public Kernel {
         write(&contacts.torque[c], count, record_of(rolling));
       }
       write(&contacts.force[c], count, with_torque(force, zero_vector<DoublePack, Pack::turns>()));
-      add_to(particles.force.data(), i, count, with_torque(force, torque));
-      if constexpr (dimension == 3 && Model::rotates) add_to(particles.torque.data(), i, count, record_of(torque));
+      add_forces(particles, i, count, force, torque);
     }
   }
 
