@@ -30,8 +30,7 @@ def main():
     axes[1].set_title("while it flows")
     figure.colorbar(shown, ax=axes[1], shrink=0.5, label="speed [m/s]")
     with h5py.File(pathlib.Path(sys.argv[1]) / "interface.h5") as record:
-        time, mass = record["time"][...], record["quantities/grains.below.mass"][...]
-    time = time if time.ndim == 1 else time[:, -1]
+        time, mass = record["windows"][...][:, 1], record["quantities/grains.below.mass"][...]
     axes[2].plot(time, mass, label="left through the outlet")
     late = time > 0.5 * time[-1]
     rate, first = np.polyfit(time[late], mass[late], 1)
