@@ -194,6 +194,11 @@ void read_loads(const io::Table& coupling, Case& read) {
 }
 
 void read_coupling(const io::Table& root, Case& read) {
+  if (!root.has("coupling"))
+    throw io::UserError(root.location(),
+                        "no [coupling]: add one with window = …, the seconds between reports, and, "
+                        "where participants meet, "
+                        "scheme, max_distance and [[coupling.interface]].");
   const auto coupling = root.table("coupling");
   // A participant alone only needs to know its windows.
   const bool couples = read.participants.size() > 1 || coupling.has("interface");

@@ -107,18 +107,23 @@ std::string explain(const io::Table& root, const std::string& name) {
   const double window = coupling.is_number("window") ? coupling.number("window", io::positive) : end;
   const double steps_a_window = std::ceil(window / limit * (1 - 1e-12)), step = window / steps_a_window;
   const double steps = steps_a_window * std::round(end / window);
-  const auto count = static_cast<double>(scene.particle_count());
+  // Half of what the inlets bring is there on average; who leaves by then is not known.
+  double fed = 0;
+  for (const auto& inlet : scene.inlets)
+    fed += inlet.rate * std::max(0.0, std::min(end, inlet.until) - inlet.from) / (inlet.density * inlet.sizes.mean_volume());
+  const double count = static_cast<double>(scene.particle_count()) + fed / 2;
 
   std::size_t meshes = 0, planes = 0;
   for (const auto& wall : scene.walls) (wall.is_plane ? planes : meshes) += 1;
   Particles none;
   none.kind = scene.kind();
   const auto costs = make_engine(scene, none)->costs();
-  const double seconds = measure_particle_step(scene, step, scene.particle_count()) * count * steps;
+  const double seconds = measure_particle_step(scene, step, static_cast<std::size_t>(count)) * count * steps;
 
   std::string text;
   const auto line = [&](const char* what, const std::string& value) { text += fmt::format("  {:22} {}\n", what, value); };
   line("particles", fmt::format("{} {}", scene.particle_count(), scene.dimension == 2 ? "discs" : "spheres"));
+  if (!scene.inlets.empty()) line("inlets", fmt::format("{:.0f} more in {:.6g} s", fed, end));
   for (const auto& set : scene.law_sets()) line("laws", set.text());
   line("walls", walls_of(scene));
   line("left out", left_out(scene, meshes, planes));
