@@ -64,14 +64,14 @@ int explain(const std::string& case_file) {
   const auto read = coupler::read_case(io::Table::from_file(case_file));
   fmt::print("{}: {} dimensions, {:.6g} s in {} windows of {:.6g} s\n", read.title, read.dimension,
              read.end, read.windows, read.window);
-  fmt::print("one-way coupling; {}\n", loads_text(read));
+  fmt::print("{}\n", read.interfaces.empty() ? "alone: coupled to nothing"
+                                             : "one-way coupling; " + loads_text(read));
   for (const auto& interface : read.interfaces)
     fmt::print("  forces of {}, mapped conservatively, at most {:.6g} m apart\n", interface.text(),
                read.max_distance);
-  fmt::print(
-      "pictures of the loaded surfaces every {:.6g} s; everything else in interface.h5, every "
-      "window\n",
-      read.time(read.output_every));
+  if (!read.interfaces.empty())
+    fmt::print("pictures of the loaded surfaces every {:.6g} s\n", read.time(read.output_every));
+  fmt::print("every window's quantities in interface.h5\n");
   for (const auto& expectation : read.expectations)
     fmt::print("expected: {} = {:.10g}, {} tolerance {:.3g}\n", expectation.name, expectation.value,
                expectation.relative ? "relative" : "absolute", expectation.tolerance);

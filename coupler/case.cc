@@ -138,10 +138,12 @@ void read_interfaces(const io::Table& coupling, Case& read) {
         table.fail("repeats an interface. Remove one of the two.");
     read.interfaces.push_back(std::move(interface));
   }
-  if (read.interfaces.empty())
-    coupling.fail("interface",
-                  "is missing. Add [[coupling.interface]] with from = \"participant.surface\" and "
-                  "to = \"participant.surface\".");
+  if (read.interfaces.empty() && read.participants.size() > 1)
+    coupling.fail(
+        fmt::format("has no [[coupling.interface]], and there are {} participants. Add one with "
+                    "from = \"participant.surface\" and "
+                    "to = \"participant.surface\"; only a participant alone needs none.",
+                    read.participants.size()));
   for (const auto& interface : read.interfaces)
     if (read.receives(interface.from.participant))
       throw io::UserError(
@@ -192,8 +194,17 @@ void read_loads(const io::Table& coupling, Case& read) {
 }
 
 void read_coupling(const io::Table& root, Case& read) {
+  if (!root.has("coupling"))
+    throw io::UserError(root.location(),
+                        "no [coupling]: add one with window = …, the seconds between reports, and, "
+                        "where participants meet, "
+                        "scheme, max_distance and [[coupling.interface]].");
   const auto coupling = root.table("coupling");
-  if (coupling.choice("scheme", {"one-way", "explicit", "parallel", "implicit"}) != "one-way")
+  // A participant alone only needs to know its windows.
+  const bool couples = read.participants.size() > 1 || coupling.has("interface");
+  const std::vector<std::string> schemes{"one-way", "explicit", "parallel", "implicit"};
+  if ((couples ? coupling.choice("scheme", schemes)
+               : coupling.choice("scheme", schemes, "one-way")) != "one-way")
     coupling.fail("scheme", fmt::format("= \"{}\" is not in this version yet. Use \"one-way\".",
                                         coupling.text("scheme")));
   if (coupling.is_text("window"))
@@ -203,7 +214,8 @@ void read_coupling(const io::Table& root, Case& read) {
   if (read.windows < 1)
     coupling.fail("window", fmt::format("= {:.10g} s is longer than the run of {:.10g} s.",
                                         read.window, read.end));
-  read.max_distance = coupling.number("max_distance", io::positive);
+  read.max_distance = couples ? coupling.number("max_distance", io::positive)
+                              : coupling.number("max_distance", io::positive, read.max_distance);
   read.start_limit = coupling.number("start_limit", io::positive, 60);
   // About twenty pictures are enough to see a run and small beside its series.
   const double every = coupling.number("output_every", io::positive, read.end / 20);

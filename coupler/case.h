@@ -82,7 +82,7 @@ struct Case {
   double start_limit = 60;        ///< [s]
   std::int64_t output_every = 1;  ///< windows between pictures
   LedgerLimits limits;
-  std::vector<InterfaceCase> interfaces;
+  std::vector<InterfaceCase> interfaces;  ///< none where a participant is alone
   std::vector<ParticipantCase> participants;
   std::vector<Expectation> expectations;
 

@@ -61,6 +61,24 @@ double measure_particle_step(const Scene& scene, double step, std::size_t expect
   return elapsed() / static_cast<double>(steps * placed);
 }
 
+// "1 plane, 2 lines of 7 segments"
+std::string walls_of(const Scene& scene) {
+  std::size_t planes = 0, surfaces = 0, facets = 0, glued = 0;
+  for (const auto& wall : scene.walls) {
+    (wall.is_plane ? planes : surfaces) += 1;
+    glued += wall.glued_diameter > 0;
+    facets += wall.mesh.triangles.size();
+    if (!wall.line.empty()) facets += wall.line.size() - (wall.closed ? 0 : 1);
+  }
+  const auto counted = [](std::size_t count, const std::string& one, const std::string& many) { return fmt::format("{} {}", count, count == 1 ? one : many); };
+  std::vector<std::string> parts;
+  if (planes) parts.push_back(counted(planes, "plane", "planes"));
+  if (surfaces && scene.dimension == 2) parts.push_back(counted(surfaces, "line", "lines") + " of " + counted(facets, "segment", "segments"));
+  if (surfaces && scene.dimension == 3) parts.push_back(counted(surfaces, "mesh", "meshes") + " of " + counted(facets, "triangle", "triangles"));
+  if (glued) parts.push_back(fmt::format("{} of them covered with glued particles", glued));
+  return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
+}
+
 std::string left_out(const Scene& scene, std::size_t meshes, std::size_t planes) {
   std::vector<std::string> out;
   const auto sets = scene.law_sets();
@@ -68,7 +86,7 @@ std::string left_out(const Scene& scene, std::size_t meshes, std::size_t planes)
   if (all([](const LawSet& set) { return set.tangential == "none"; })) out.emplace_back("friction and its history");
   if (all([](const LawSet& set) { return set.rolling == "none"; })) out.emplace_back("rolling resistance");
   if (!scene.rotates()) out.emplace_back("rotation");
-  if (meshes == 0) out.emplace_back("triangle walls");
+  if (meshes == 0) out.emplace_back(scene.dimension == 2 ? "walls of segments" : "triangle walls");
   if (planes == 0) out.emplace_back("planes");
   if (std::none_of(scene.walls.begin(), scene.walls.end(), [](const Wall& wall) { return wall.motion.moves(); })) out.emplace_back("moving walls");
   if (scene.damping.none()) out.emplace_back("damping beyond the contacts");
@@ -89,23 +107,25 @@ std::string explain(const io::Table& root, const std::string& name) {
   const double window = coupling.is_number("window") ? coupling.number("window", io::positive) : end;
   const double steps_a_window = std::ceil(window / limit * (1 - 1e-12)), step = window / steps_a_window;
   const double steps = steps_a_window * std::round(end / window);
-  const auto count = static_cast<double>(scene.particle_count());
+  // Half of what the inlets bring is there on average; who leaves by then is not known.
+  double fed = 0;
+  for (const auto& inlet : scene.inlets)
+    fed += inlet.rate * std::max(0.0, std::min(end, inlet.until) - inlet.from) / (inlet.density * inlet.sizes.mean_volume());
+  const double count = static_cast<double>(scene.particle_count()) + fed / 2;
 
-  std::size_t meshes = 0, planes = 0, triangles = 0;
-  for (const auto& wall : scene.walls) {
-    (wall.is_plane ? planes : meshes) += 1;
-    triangles += wall.mesh.triangles.size();
-  }
+  std::size_t meshes = 0, planes = 0;
+  for (const auto& wall : scene.walls) (wall.is_plane ? planes : meshes) += 1;
   Particles none;
   none.kind = scene.kind();
   const auto costs = make_engine(scene, none)->costs();
-  const double seconds = measure_particle_step(scene, step, scene.particle_count()) * count * steps;
+  const double seconds = measure_particle_step(scene, step, static_cast<std::size_t>(count)) * count * steps;
 
   std::string text;
   const auto line = [&](const char* what, const std::string& value) { text += fmt::format("  {:22} {}\n", what, value); };
   line("particles", fmt::format("{} {}", scene.particle_count(), scene.dimension == 2 ? "discs" : "spheres"));
+  if (!scene.inlets.empty()) line("inlets", fmt::format("{:.0f} more in {:.6g} s", fed, end));
   for (const auto& set : scene.law_sets()) line("laws", set.text());
-  line("walls", fmt::format("{} mesh(es) of {} triangles, {} plane(s)", meshes, triangles, planes));
+  line("walls", walls_of(scene));
   line("left out", left_out(scene, meshes, planes));
   line("bytes a particle", fmt::format("{}", costs.bytes_per_particle));
   line("bytes a contact", fmt::format("{}", costs.bytes_per_contact));

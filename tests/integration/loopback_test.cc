@@ -134,7 +134,8 @@ class Loopback : public ::testing::Test {
     next_endpoint();
     ear_.close();
     Served a, b;
-    if (!read.find("grains")->replay) serve(sender, "grains", a);
+    if (const auto* grains = read.find("grains"); grains && !grains->replay)
+      serve(sender, "grains", a);
     serve(receiver, "structure", b);
     std::thread beside([&] {
       ear_.wait_until_open();
@@ -341,6 +342,36 @@ TEST_F(Loopback, ReplayInOtherWindowsKeepsTheImpulse) {
   for (std::size_t p = 0; p < a.size();
        ++p)  // a mean of recorded means, to the round-off of the mapping
     EXPECT_LT((receiver.got[0].force[p] - (0.4 * a[p] + 0.4 * b[p] + 0.2 * c[p])).norm(), 1e-13);
+}
+
+TEST_F(Loopback, AParticipantAloneNeedsOnlyItsWindows) {
+  const std::string alone = R"(
+dimension = 3
+end = 1.0
+[coupling]
+window = 0.1
+[structure]
+command = ["b"]
+[expect]
+"structure.reaction.z" = { value = 0, absolute = 0, source = "nobody loads it" }
+)";
+  const auto outcome = run(alone, results("alone"));
+  EXPECT_EQ(outcome.status, Status::met);
+  EXPECT_EQ(outcome.windows, 10);
+  EXPECT_TRUE(outcome.interfaces.empty());
+  // With somebody else in the case there must be something between them.
+  auto two = alone;
+  two.replace(two.find("window = 0.1"), 12, "scheme = \"one-way\"\nmax_distance = 1\nwindow = 0.1");
+  two += "[grains]\ncommand = [\"a\"]\n";
+  try {
+    coupler::read_case(io::Table::from_text(two, "case.toml"));
+    FAIL() << "two participants and no interface";
+  } catch (const io::UserError& error) {
+    EXPECT_NE(
+        std::string(error.what()).find("no [[coupling.interface]], and there are 2 participants"),
+        std::string::npos)
+        << error.what();
+  }
 }
 
 TEST_F(Loopback, ExpectationsReadTheLastWindowOrTheMean) {
