@@ -50,8 +50,9 @@ class Study:
             writer.writerow(header)
             writer.writerows(rows)
 
-    def figure(self, draw, size=(7, 4)):
-        """draw(axes) on a fresh figure, saved as NAME.svg. Without matplotlib the page says so."""
+    def figure(self, draw, size=(7, 4), part="", panels=1):
+        """draw(axes), or a list of `panels` axes side by side, on a fresh figure, saved as NAME.svg or NAME_PART.svg. Without matplotlib
+        the page says so."""
         try:
             import matplotlib
         except ImportError:
@@ -60,12 +61,13 @@ class Study:
         matplotlib.use("Agg")
         matplotlib.rcParams["svg.hashsalt"] = self.name  # the same data give the same file
         import matplotlib.pyplot as plt
-        figure, axes = plt.subplots(figsize=size)
+        figure, axes = plt.subplots(1, panels, figsize=size, layout="constrained" if panels > 1 else None)
         draw(axes)
         self.out.mkdir(parents=True, exist_ok=True)
-        figure.savefig(self.out / f"{self.name}.svg", bbox_inches="tight", metadata={"Date": None})
+        name = f"{self.name}_{part}.svg" if part else f"{self.name}.svg"
+        figure.savefig(self.out / name, bbox_inches="tight", metadata={"Date": None})
         plt.close(figure)
-        self.parts.append(f"![{self.about}]({self.name}.svg)")
+        self.parts.append(f"![{self.about}]({name})")
 
     # --- running things -------------------------------------------------------------------------------------------
     def program(self, name):
