@@ -50,9 +50,9 @@ class Study:
             writer.writerow(header)
             writer.writerows(rows)
 
-    def figure(self, draw, size=(7, 4), part="", panels=1):
-        """draw(axes), or a list of `panels` axes side by side, on a fresh figure, saved as NAME.svg or NAME_PART.svg. Without matplotlib
-        the page says so."""
+    def figure(self, draw, size=(7, 4), heights=None, panels=1, part=""):
+        """draw(axes) on a fresh figure, saved as NAME.svg, or NAME_PART.svg; with `heights`, axes are so many, one above the other, of such
+        relative heights; with `panels`, so many side by side. Without matplotlib the page says so."""
         try:
             import matplotlib
         except ImportError:
@@ -61,7 +61,7 @@ class Study:
         matplotlib.use("Agg")
         matplotlib.rcParams["svg.hashsalt"] = self.name  # the same data give the same file
         import matplotlib.pyplot as plt
-        figure, axes = plt.subplots(1, panels, figsize=size, layout="constrained" if panels > 1 else None)
+        figure, axes = plt.subplots(len(heights or [1]), panels, figsize=size, height_ratios=heights, layout="constrained")
         draw(axes)
         self.out.mkdir(parents=True, exist_ok=True)
         name = f"{self.name}_{part}.svg" if part else f"{self.name}.svg"

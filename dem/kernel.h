@@ -63,6 +63,8 @@ struct Exports {
 struct ContactStiffness {
   double normal = 0, shear = 0, rolling = 0;                   ///< [N/m], [N/m], [N m/rad]
   double normal_dashpot = 0, shear_dashpot = 0, rolling_dashpot = 0;  ///< [N s/m], [N s/m], [N m s/rad]
+  double twisting = 1;    ///< springs and dashpots about the normal, in three dimensions, over those of rolling
+  double spin_share = 0;  ///< a torque beside them takes at most this share of the relative spin in a step, whatever the step
 };
 
 /// A contact model with the parameters of one pair of materials. Stateless: histories live in the contacts.

@@ -18,7 +18,8 @@ struct StepRatio {
 /// For leapfrog with springs that follow the motion exactly, normal dashpots at the extrapolated rate and the others at the rate of the
 /// half step, a mode with stiffness κ, mass 1 and dashpots γ_n, γ_t is stable while Δt² κ + 2 Δt (2 γ_n + γ_t) ≤ 4 (the characteristic
 /// polynomials at z = −1; for the lagged dashpot alone this is (2/ω)(sqrt(1 + ζ²) − ζ)). For the whole bed the largest eigenvalue of
-/// M⁻¹(Δt² K + 2 Δt (2 C_n + C_t)) decides. It is at most the largest over the particles of that of their own blocks, translation and
+/// M⁻¹(Δt² K + 2 Δt (2 C_n + C_t)) decides. A rolling torque that takes a share of the relative spin in a step is a dashpot c_t = share I*/Δt.
+/// The eigenvalue is at most the largest over the particles of that of their own blocks, translation and
 /// rotation together, with pairs counted twice and walls once: (x + y)² ≤ 2 x² + 2 y² for the two bodies of each contact.
 class StabilityEstimate {
  public:
@@ -27,7 +28,7 @@ class StabilityEstimate {
   void add_wall(std::uint32_t i, double overlap, const Vec3& normal, double curvature, const Kernel& kernel);
   /// The safe bound. It is careful by up to a factor of two or three in dense beds.
   StepRatio bound() const;
-  /// The bed's own limit, by power iteration from the bound's mode: a few per cent too small at most, and dearer than the bound.
+  /// The bed's own limit, by conjugate iteration from the bound's mode: to a thousandth or so, and dearer than the bound.
   StepRatio limit() const;
   /// The bound while that says that the step is stable, else the limit.
   StepRatio ratio() const {
@@ -36,22 +37,27 @@ class StabilityEstimate {
   }
 
  private:
-  // Rates of a contact, scaled: Δt² k and 2 Δt (2 c_n or c_t).
+  // What a contact adds to Δt² K and to 2 Δt (2 C_n + C_t), and of the latter what does not depend on Δt.
+  struct Rates {
+    double stiffness = 0, dashpot = 0, fixed = 0;
+    double at(const Rates& weights) const { return stiffness * weights.stiffness + dashpot * weights.dashpot + fixed * weights.fixed; }
+  };
   struct Contact {
     std::uint32_t i, j;  // j: none at a wall
     Vec3 normal;
     double arm_i, arm_j;
-    double stiffness[3], dashpot[3];  // normal, shear, rolling
+    Rates closing, shear, rolling, twisting;
   };
   static constexpr std::uint32_t none = ~0u;
   using Motion = Eigen::Matrix<double, 6, Eigen::Dynamic>;  // velocity and spin of every particle, times the roots of mass and inertia
-  void apply(const Motion& motion, Motion& result, double stiffness, double dashpot) const;
-  void remember(std::uint32_t i, std::uint32_t j, const Vec3& normal, double arm_i, double arm_j, const ContactStiffness& contact);
   using Block = Eigen::Matrix<double, 6, 6>;
   struct Sums {
-    Block stiffness = Block::Zero(), dashpot = Block::Zero();  // Δt² K and 2 Δt (2 C_n + C_t), over mass and inertia
+    Block stiffness = Block::Zero(), dashpot = Block::Zero(), fixed = Block::Zero();
+    Block all() const { return stiffness + dashpot + fixed; }
   };
-  void add(std::uint32_t i, const Vec3& normal, double arm, const ContactStiffness& contact, double bodies);
+  void add(Contact contact, const ContactStiffness& rates, double reduced_inertia);
+  void add_to(std::uint32_t i, const Vec3& normal, double arm, const Contact& contact, double bodies);
+  void apply(const Motion& motion, Motion& result, const Rates& weights) const;
   const Particles& particles_;
   double step_;
   std::vector<std::uint32_t> place_;  // in sums_, of a particle with contacts

@@ -27,6 +27,8 @@ struct ConstantTorque {
   /// of 2 (I*/I) cap stays below 2, so the cap takes an eighth of the spin a step.
   static constexpr double share = 0.125;
 
+  /// Before the first step, where no time has passed, the cap is not known and there is no torque.
+  ///
   /// @param normal_force  [N]
   /// @return torque on i [N m]; −torque acts on j. `energy`: what a spring stores [J]; `work`: what was taken in the step [J]
   template <class K>
@@ -37,7 +39,7 @@ struct ConstantTorque {
     energy = Real(0);
     const Real spin = sqrt(dot(k.relative_spin, k.relative_spin));
     // As a factor of the relative spin: what the law asks over |ω|, or the cap, whichever is less.
-    const Real cap = (share / k.step) * k.reduced_inertia;
+    const Real cap = (k.step > 0 ? share / k.step : 0.0) * k.reduced_inertia;
     const Real asked = select(spin > Real(0), p.friction * normal_force * k.reduced_radius / spin, Real(0));
     const Real factor = min(asked, cap);
     work = k.step * factor * spin * spin;
