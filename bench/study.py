@@ -50,9 +50,9 @@ class Study:
             writer.writerow(header)
             writer.writerows(rows)
 
-    def figure(self, draw, size=(7, 4), heights=None):
-        """draw(axes) on a fresh figure, saved as NAME.svg; with `heights`, axes are so many, one above the other, of such relative heights.
-        Without matplotlib the page says so."""
+    def figure(self, draw, size=(7, 4), heights=None, panels=1, part=""):
+        """draw(axes) on a fresh figure, saved as NAME.svg, or NAME_PART.svg; with `heights`, axes are so many, one above the other, of such
+        relative heights; with `panels`, so many side by side. Without matplotlib the page says so."""
         try:
             import matplotlib
         except ImportError:
@@ -61,12 +61,13 @@ class Study:
         matplotlib.use("Agg")
         matplotlib.rcParams["svg.hashsalt"] = self.name  # the same data give the same file
         import matplotlib.pyplot as plt
-        figure, axes = plt.subplots(len(heights or [1]), figsize=size, height_ratios=heights, layout="constrained")
+        figure, axes = plt.subplots(len(heights or [1]), panels, figsize=size, height_ratios=heights, layout="constrained")
         draw(axes)
         self.out.mkdir(parents=True, exist_ok=True)
-        figure.savefig(self.out / f"{self.name}.svg", bbox_inches="tight", metadata={"Date": None})
+        name = f"{self.name}_{part}.svg" if part else f"{self.name}.svg"
+        figure.savefig(self.out / name, bbox_inches="tight", metadata={"Date": None})
         plt.close(figure)
-        self.parts.append(f"![{self.about}]({self.name}.svg)")
+        self.parts.append(f"![{self.about}]({name})")
 
     # --- running things -------------------------------------------------------------------------------------------
     def program(self, name):

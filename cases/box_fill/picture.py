@@ -5,7 +5,6 @@ Left: the spheres at rest, seen from above one corner, and the box's edges. Righ
 the nodes of its floor, mean over the last window.
 """
 import pathlib
-import re
 import sys
 
 import h5py
@@ -16,19 +15,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import EllipseCollection, LineCollection
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
-def read_points(path):
-    """Points and point data of a .vtp file with appended raw arrays, as acopla-dem writes it."""
-    raw = path.read_bytes()
-    head, data = raw.split(b'<AppendedData encoding="raw">\n_', 1)
-    arrays = {}
-    for kind, name, parts, offset in re.findall(rb'type="(\w+)" Name="(\w+)" NumberOfComponents="(\d+)" format="appended" offset="(\d+)"', head):
-        start = int(offset)
-        size = int(np.frombuffer(data, "<u8", 1, start)[0])
-        values = np.frombuffer(data, {b"Float32": "<f4", b"Float64": "<f8", b"Int32": "<i4"}[kind], offset=start + 8,
-                               count=size // (8 if kind == b"Float64" else 4))
-        arrays[name.decode()] = values.reshape(-1, int(parts)) if int(parts) > 1 else values
-    return arrays
+from vtp import read_points  # noqa: E402
 
 
 def main():

@@ -6,28 +6,18 @@ fitted to those between 15 and 85 % of the highest. Beside the slope: its standa
 """
 import argparse
 import pathlib
-import re
+import sys
 
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
-def read_points(path):
-    """Points and point data of a .vtp file with appended raw arrays, as acopla-dem writes it."""
-    head, data = path.read_bytes().split(b'<AppendedData encoding="raw">\n_', 1)
-    arrays = {}
-    for kind, name, parts, offset in re.findall(rb'type="(\w+)" Name="(\w+)" NumberOfComponents="(\d+)" format="appended" offset="(\d+)"', head):
-        start = int(offset)
-        size = int(np.frombuffer(data, "<u8", 1, start)[0])
-        values = np.frombuffer(data, {b"Float32": "<f4", b"Float64": "<f8", b"Int32": "<i4"}[kind], offset=start + 8,
-                               count=size // (8 if kind == b"Float64" else 4))
-        arrays[name.decode()] = values.reshape(-1, int(parts)) if int(parts) > 1 else values
-    return arrays
+from vtp import discs, pictures  # noqa: E402
 
 
 def last_discs(results):
     """x, y and radius of the discs at the end of a run."""
-    found = read_points(sorted(pathlib.Path(results).rglob("discs_[0-9]*.vtp"))[-1])
-    return found["Points"][:, 0], found["Points"][:, 1], found["radius"].astype(float)
+    return discs(pictures(results, "discs")[-1][1])
 
 
 def touching(x, y, r):

@@ -1004,8 +1004,8 @@ def piles():
     free_mass = disc(0.005, 1056.0)[0]
     barrier_mass = disc(0.006, 1056.0)[0]
     solid = 105 * np.pi / 4 * (0.013**2 + 2 * 0.012**2 + 0.011**2)
-    fine = 3750 * np.pi / 4 * (0.0022**2 + 2 * 0.002**2 + 0.0018**2)
-    width, fraction = 0.2, 0.82
+    fine = 3750 * np.pi / 4 * (0.0022**2 + 0.002**2 + 2 * 0.0018**2)
+    width, fraction = 0.3, 0.82
     triangle = {f"{angle:g}": {"crest_height": np.sqrt(2 * solid / fraction * np.tan(np.radians(angle))),
                                "toe_distance": np.sqrt(2 * solid / fraction / np.tan(np.radians(angle)))} for angle in (20.5, 21.0, 28.0)}
     return {"source": "Gomes (2014) 3.3.1-3.3.2, tables 3.4-3.7; angles 28, 20.5 degrees, experiment of Li et al. (2005) 21 degrees",
@@ -1021,9 +1021,9 @@ def piles():
                             "global_damping": [6.7e-5, 6.7e-6],
                             "paper_step": 1e-5, "settling": 2.0, "lift_speed": 0.01, "lift_time": 15.0, "rest": 2.0,
                             "groups_420": [[0.013, 105], [0.012, 210], [0.011, 105]],
-                            "groups_15000": [[0.0022, 3750], [0.002, 7500], [0.0018, 3750]],
+                            "groups_15000": [[0.0022, 3750], [0.002, 3750], [0.0018, 7500]],
                             "chosen_column_width": width, "chosen_floor_length": 0.8, "chosen_wall_height": 0.6,
-                            "chosen_barrier_thickness": "none (a line)"}},
+                            "chosen_barrier_thickness": "glued particles on a line"}},
             "values": {"free_pile_positions_without_jitter": pile_positions(0.005, 1, 0.0)[0],
                        "free_pile": restitution_behind(36.5, free_mass, 6.5e4) | {"mass": free_mass,
                                                                                   "sqrt_m_over_k": np.sqrt(free_mass / 6.5e4)},
