@@ -18,7 +18,7 @@ from study import Study  # noqa: E402
 
 STUDIES = {
     "box_fill": "spheres fill a steel box: tables 4-4 to 4-11 of Nasato (2011), conservation, cost of the search",
-    "dem_speed": "particle-steps per second on a settled bed against LAMMPS and LIGGGHTS, one core",
+    "dem_speed": "particle-steps per second on a settled bed against LAMMPS and LIGGGHTS; what each feature, thread and triangle costs",
 }
 
 

@@ -50,8 +50,9 @@ class Study:
             writer.writerow(header)
             writer.writerows(rows)
 
-    def figure(self, draw, size=(7, 4)):
-        """draw(axes) on a fresh figure, saved as NAME.svg. Without matplotlib the page says so."""
+    def figure(self, draw, size=(7, 4), heights=None):
+        """draw(axes) on a fresh figure, saved as NAME.svg; with `heights`, axes are so many, one above the other, of such relative heights.
+        Without matplotlib the page says so."""
         try:
             import matplotlib
         except ImportError:
@@ -60,7 +61,7 @@ class Study:
         matplotlib.use("Agg")
         matplotlib.rcParams["svg.hashsalt"] = self.name  # the same data give the same file
         import matplotlib.pyplot as plt
-        figure, axes = plt.subplots(figsize=size)
+        figure, axes = plt.subplots(len(heights or [1]), figsize=size, height_ratios=heights, layout="constrained")
         draw(axes)
         self.out.mkdir(parents=True, exist_ok=True)
         figure.savefig(self.out / f"{self.name}.svg", bbox_inches="tight", metadata={"Date": None})

@@ -4,6 +4,14 @@
 
 #include "dem/kernel.h"
 
+// Everything a loop over contacts calls becomes part of its body: a call in it would spill every register. Not under sanitizers, whose
+// checks would make one body of it that takes minutes to compile.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define ACOPLA_ONE_BODY
+#else
+#define ACOPLA_ONE_BODY [[gnu::flatten]]
+#endif
+
 namespace acopla::dem {
 
 template <class Model, int dimension>
@@ -160,9 +168,8 @@ class KernelOf final : public Kernel {
     return r;
   }
 
-  // flatten: everything below is one loop body; a call in it would spill every register.
   template <bool ledger>
-  [[gnu::flatten]] void all_pairs(PairContacts& contacts, Particles& particles, Exports& exports, double step, ContactEnergy<double>* energy) const {
+  ACOPLA_ONE_BODY void all_pairs(PairContacts& contacts, Particles& particles, Exports& exports, double step, ContactEnergy<double>* energy) const {
     using std::max, std::sqrt;
     for (std::size_t c = 0; c < contacts.size; c += lanes) {
       const auto count = std::min(lanes, contacts.size - c);
@@ -226,7 +233,7 @@ class KernelOf final : public Kernel {
   }
 
   template <bool ledger>
-  [[gnu::flatten]] void all_walls(WallContacts& contacts, Particles& particles, double step, ContactEnergy<double>* energy) const {
+  ACOPLA_ONE_BODY void all_walls(WallContacts& contacts, Particles& particles, double step, ContactEnergy<double>* energy) const {
     using std::max;
     for (std::size_t c = 0; c < contacts.size; c += lanes) {
       const auto count = std::min(lanes, contacts.size - c);
@@ -288,3 +295,5 @@ class KernelOf final : public Kernel {
 };
 
 }  // namespace acopla::dem
+
+#undef ACOPLA_ONE_BODY

@@ -1,6 +1,7 @@
 // What a user may write wrong in a DEM table, and the sentence that answers.
 #include <gtest/gtest.h>
 
+#include "dem/explain.h"
 #include "dem/feeding/insertion.h"
 #include "scenes.h"
 
@@ -103,6 +104,32 @@ TEST(Insertion, SeedDecidesThePlaces) {
   EXPECT_EQ(first.position[7].vector(), again.position[7].vector());
   scene.seed = 2;
   EXPECT_NE(first.position[7].vector(), insert_particles(scene, walls).position[7].vector());
+}
+
+TEST(Explain, MeasuresASceneWhoseGluedParticlesReachIntoItsRegion) {
+  // A regression: the lattice that the expected run time is measured on was laid across glued particles, which "pushed it through the wall".
+  const auto root = io::Table::from_text(R"(dimension = 2
+end = 1.0
+gravity = [0, -9.81]
+[g]
+solver = "dem"
+[g.material.m]
+density = 1000
+[[g.contact]]
+between = [["m", "m"]]
+normal = { law = "linear", stiffness = 1e6 }
+restitution = 0.5
+[g.wall.floor]
+line = [[0, 0.6], [0, 0], [0.8, 0], [0.8, 0.6]]
+glued = { diameter = 0.012 }
+material = "m"
+[[g.insert]]
+material = "m"
+diameter = 0.012
+count = 100
+region = { box = [[0, 0], [0.8, 0.6]] }
+)", "case.toml");
+  EXPECT_NE(explain(root, "g").find("expected run time"), std::string::npos);
 }
 
 TEST(SceneSet, SmoothSpheresStoreNoRotationAndNoHistory) {

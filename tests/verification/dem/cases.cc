@@ -356,11 +356,16 @@ Outcome struck_ball(double fraction, const std::string& key) {
   return outcome;
 }
 
-Outcome rolling(double fraction, const std::string& key) {
+namespace {
+
+/// What reference.json says of a key of rolling_consistent or rolling_printed.
+const Json& rolling_reference(const std::string& key) {
+  return key.rfind("r_0", 0) == 0 ? reference()["rolling_printed"]["values"][key] : reference()["rolling_consistent"]["values"]["soft"][key];
+}
+
+Roller roller_of(const std::string& key) {
   const bool printed = key.rfind("r_0", 0) == 0;
-  const auto& about = reference()[printed ? "rolling_printed" : "rolling_consistent"];
-  const auto& p = about["parameters"];
-  const auto& expected = printed ? about["values"][key] : about["values"]["soft"][key];
+  const auto& p = reference()[printed ? "rolling_printed" : "rolling_consistent"]["parameters"];
   Roller roller;
   roller.disc = key.rfind("sphere", 0) != 0;
   roller.density = p["density"];
@@ -389,15 +394,41 @@ Outcome rolling(double fraction, const std::string& key) {
     roller.rolling_friction = number("mu_r_", 0.2);
   }
   roller.velocity = Vec3(p["speed"], 0, 0);
+  return roller;
+}
+
+}  // namespace
+
+Outcome rolling(double fraction, const std::string& key) {
+  const auto& expected = rolling_reference(key);
+  const auto roller = roller_of(key);
   Outcome outcome;
   auto run = put_down(roller, fraction, outcome);
-  const auto& samples = expected["samples_t_x_v_w_force_couple"];
-  compare_samples(run, samples, roller.radius, expected["largest_distance"], 1, outcome);
+  compare_samples(run, expected["samples_t_x_v_w_force_couple"], roller.radius, expected["largest_distance"], 1, outcome);
   if (!expected["first_standstill"].is_null()) {
     auto again = put_down(roller, fraction, outcome);
     compare_standstill(again, expected["first_standstill"], outcome);
   }
   return outcome;
+}
+
+std::vector<RollingState> rolling_trace(double fraction, const std::string& key, double end, int count) {
+  const auto roller = roller_of(key);
+  const double arm = roller.radius - roller.mass() * standard_gravity / roller.normal_stiffness;
+  Outcome outcome;
+  auto run = put_down(roller, fraction, outcome);
+  std::vector<RollingState> trace;
+  for (int k = 1; k <= count; ++k) {
+    run.to(end * k / count - 1.5 * outcome.step);
+    const double v = velocity(*run.engine)[0], w = spin(*run.engine)[2], time = run.engine->time();
+    run.advance(2);
+    const double span = run.engine->time() - time;
+    const double force = roller.mass() * (velocity(*run.engine)[0] - v) / span;
+    // I ω' = a F + M
+    const double couple = roller.inertia() * (spin(*run.engine)[2] - w) / span - arm * force;
+    trace.push_back({time + 0.5 * span, position(*run.engine)[0], 0.5 * (v + velocity(*run.engine)[0]), spin(*run.engine)[2], couple});
+  }
+  return trace;
 }
 
 Outcome incline(double fraction, const std::string& key) {
@@ -468,6 +499,74 @@ Outcome spin_decay(double fraction, const std::string& key) {
   }
   run.to(1.0);
   add(outcome, "spin at the end [rad/s]", spin_now(), 0, start);
+  return outcome;
+}
+
+// --- statics -------------------------------------------------------------------------------------------------------------
+
+namespace {
+
+OneMaterial resting(const std::string& law) {
+  const auto& p = reference()["statics"]["parameters"];
+  OneMaterial setup;
+  setup.density = p["density"];
+  setup.restitution = 0.1;
+  if (law == "hertz") {
+    // Y* = E/(2 (1 − ν²)) of two equal bodies.
+    setup.normal = "\"hertz\"";
+    setup.poisson = 0.25;
+    setup.shear_modulus = p["reduced_modulus_of_every_pair"].get<double>() * 2 * (1 - 0.25 * 0.25) / (2 * 1.25);
+  } else {
+    setup.normal = linear(p["linear_stiffness"]);
+  }
+  // The dashpots of contacts with a small particle are small: a drag of 1000 m v takes the swings of the large ones, and nothing at rest.
+  setup.more = "damping = { viscous = { translation = 1000 } }";
+  return setup;
+}
+
+}  // namespace
+
+Outcome column(double fraction, const std::string& key, const std::vector<double>& radii) {
+  const auto& expected = reference()["statics"]["values"][key];
+  auto setup = resting(key.find("hertz") == std::string::npos ? "linear" : "hertz");
+  setup.gravity = down();
+  setup.radius = *std::min_element(radii.begin(), radii.end());
+  const auto scene = scene_of(setup);
+  std::vector<Body> bodies;
+  double height = 0;
+  for (const double r : radii) {
+    bodies.push_back({Vec3(0, height + r, 0), r});
+    height += 2 * r;
+  }
+  Outcome outcome;
+  Run run(fraction * critical_step(scene).seconds, engine_of(scene, bodies, {plane(Vec3::Zero(), Vec3::UnitY())}), outcome);
+  run.to(0.05);
+  run.advance();  // loads are means over a window
+  for (std::uint32_t k = 0; k < radii.size(); ++k)
+    add(outcome, fmt::format("centre {} [m]", k), position(*run.engine, k)[1], expected["centres"][k]);
+  add(outcome, "force on the floor [N]", -run.engine->wall_load().walls[0].force[1], expected["forces"][0]);
+  return outcome;
+}
+
+Outcome squeezed_row(double fraction, const std::string& key, const std::string& law) {
+  const auto& expected = reference()["statics"]["values"][key];
+  const double small = key == "row_ratio_10" ? 0.001 : 0.0001, r = 0.01, gap = expected["gap_between_walls"];
+  auto setup = resting(law);
+  setup.radius = small;
+  const auto scene = scene_of(setup);
+  // The squeeze shared equally at first; the bodies find their places.
+  const double share = expected["squeeze"].get<double>() / 4;
+  const double a = r - share, b = a + r + small - share, c = b + small + r - share;
+  Outcome outcome;
+  Run run(fraction * critical_step(scene).seconds,
+          engine_of(scene, {{Vec3(a, 0, 0), r}, {Vec3(b, 0, 0), small}, {Vec3(c, 0, 0), r}},
+                    {plane(Vec3::Zero(), Vec3::UnitX()), plane(Vec3(gap, 0, 0), -Vec3::UnitX())}), outcome);
+  run.to(0.05);
+  run.advance();
+  add(outcome, "force on the first wall [N]", -run.engine->wall_load().walls[0].force[0], expected[law + "_force"]);
+  add(outcome, "force on the second wall [N]", run.engine->wall_load().walls[1].force[0], expected[law + "_force"]);
+  add(outcome, "overlap with the small one [m]", r + small - (position(*run.engine, 1)[0] - position(*run.engine, 0)[0]),
+      law == "linear" ? expected["linear_overlap"].get<double>() : expected["hertz_overlaps"][1].get<double>());
   return outcome;
 }
 

@@ -32,6 +32,11 @@ Outcome elastic_collision(double fraction, std::size_t soft);
 Outcome struck_ball(double fraction, const std::string& key);
 /// @param key  of rolling_consistent.soft or rolling_printed
 Outcome rolling(double fraction, const std::string& key);
+/// Of the same, at `count` equal times up to `end` [s].
+struct RollingState {
+  double time, x, v, spin, couple;  ///< [s], [m], [m/s], [rad/s], [N m]; the couple is the rolling law's
+};
+std::vector<RollingState> rolling_trace(double fraction, const std::string& key, double end, int count);
 /// @param key  of incline
 Outcome incline(double fraction, const std::string& key);
 Outcome free_vibration(double fraction, double zeta);
@@ -45,6 +50,11 @@ Outcome restitution(double fraction, const std::string& normal, double e, bool p
 Outcome oblique_impact(double fraction, double e, double tangential);
 /// @param key  "torsion_printed" or "rolling_frictionless_floor_printed"
 Outcome spin_decay(double fraction, const std::string& key);
+
+/// A column put together touching comes to rest on a floor. @param key  "column_ratio_100_hertz"; @param radii  lowest first [m]
+Outcome column(double fraction, const std::string& key, const std::vector<double>& radii);
+/// Three in a row squeezed between walls. @param key  "row_ratio_10"; @param law  "linear" or "hertz"
+Outcome squeezed_row(double fraction, const std::string& key, const std::string& law);
 
 /// For the order of convergence on contacts that stay closed: position or angle against a closed form.
 Outcome normal_oscillation(double fraction, double zeta);
