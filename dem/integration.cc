@@ -9,8 +9,6 @@ namespace {
 
 using Four = RecordVector;
 
-Four absolute(const Four& v) { return v < 0 ? -v : v; }
-
 template <int dimension, bool spins, bool moves>
 Travel advance(Particles& particles, const Vec3& gravity, double kick, double step, std::uint32_t first, std::uint32_t last) {
   constexpr bool plane = dimension == 2;
@@ -29,7 +27,8 @@ Travel advance(Particles& particles, const Vec3& gravity, double kick, double st
     if constexpr (moves) {
       const Four moved = velocity * shift;
       x += moved;
-      farthest = absolute(moved) > farthest ? absolute(moved) : farthest;
+      const Four length = moved < 0 ? -moved : moved;
+      farthest = length > farthest ? length : farthest;
       sum += moved;
       force = Four{};
     }
