@@ -6,45 +6,89 @@
 #include <cmath>
 #include <limits>
 
-#include "dem/contact/linear_slider.h"
+#include "dem/laws.h"
 
 namespace acopla::dem {
+
+namespace {
+
+// What a mode's eigenvalue of Δt² K + 2 Δt (2 C_n + C_t) over its mass has of the square of the step, of the step, and of neither.
+struct Mode {
+  double square = 0, once = 0, fixed = 0;
+  void cover(const Mode& other) {
+    square = std::max(square, other.square);
+    once = std::max(once, other.once);
+    fixed = std::max(fixed, other.fixed);
+  }
+  Mode operator+(const Mode& other) const { return {square + other.square, once + other.once, fixed + other.fixed}; }
+  // Where the eigenvalue reaches 4 (dem/stability.h).
+  double limit() const {
+    const double left = 4 - fixed;
+    return square + once > 0 && left > 0 ? 2 * left / (once + std::sqrt(once * once + 4 * left * square)) : std::numeric_limits<double>::infinity();
+  }
+};
+
+// A particle amid contacts in all directions, whose neighbours move against it: it is displaced, it turns as they turn, or against them.
+struct Neighbourhood {
+  Mode moves, turns_along, turns_against;
+  Neighbourhood() = default;
+  /// @param weight  the contacts, those with particles counted twice
+  Neighbourhood(const ContactStiffness& c, double weight, double inertia_share, int dimension, double mass, double inertia, double radius) {
+    // Means over the directions: of n n, of the part of a spin that slips, and of those that roll and twist.
+    const bool plane = dimension == 2;
+    const double along = 1.0 / dimension, across = 1 - along, slips = plane ? 1.0 : 2.0 / 3, rolls = plane ? 1.0 : (2 + c.twisting) / 3;
+    moves = {weight * (along * c.normal + across * c.shear) / mass, 2 * weight * (2 * along * c.normal_dashpot + across * c.shear_dashpot) / mass, 0};
+    turns_along = {weight * slips * radius * radius * c.shear / inertia, 2 * weight * slips * radius * radius * c.shear_dashpot / inertia, 0};
+    turns_against = {weight * rolls * c.rolling / inertia, 2 * weight * rolls * c.rolling_dashpot / inertia, 2 * weight * c.spin_share * inertia_share};
+  }
+  void cover(const Neighbourhood& other) {
+    moves.cover(other.moves);
+    turns_along.cover(other.turns_along);
+    turns_against.cover(other.turns_against);
+  }
+};
+
+// The limit of a particle of a material in a dense packing of its like in a corner of walls, at an overlap over its radius.
+double limit_in_packing(const Scene& scene, std::size_t of, double overlap) {
+  const auto used = scene.particle_materials();
+  const double r = scene.smallest_radius(of), m = scene.materials[of].density * volume_of(scene.dimension, r);
+  const double inertia = (scene.dimension == 2 ? 0.5 : 0.4) * m * r * r, rolling = inertia + m * r * r;
+  Neighbourhood particles, walls;
+  for (std::size_t other = 0; other < scene.materials.size(); ++other) {
+    const auto& pair = scene.pair(of, other);
+    if (pair.laws.normal.empty()) continue;
+    const auto kernel = scene.laws->make(pair, scene.dimension);
+    if (std::find(used.begin(), used.end(), other) != used.end()) {
+      // Twelve spheres or six discs around one.
+      const double contacts = scene.dimension == 2 ? 6 : 12;
+      particles.cover({kernel->stiffness(overlap * r, r / 2, m / 2, rolling / 2), 2 * contacts, 0.5, scene.dimension, m, inertia, r});
+    } else {
+      walls.cover({kernel->stiffness(overlap * r, r, m, rolling), static_cast<double>(scene.dimension), 1, scene.dimension, m, inertia, r});
+    }
+  }
+  return std::min({(particles.moves + walls.moves).limit(), (particles.turns_along + walls.turns_along).limit(),
+                   (particles.turns_against + walls.turns_against).limit()});
+}
+
+}  // namespace
 
 CriticalStep critical_step(const Scene& scene) {
   CriticalStep critical{std::numeric_limits<double>::infinity(), ""};
   const auto consider = [&](double seconds, std::string reason) {
     if (seconds < critical.seconds) critical = {seconds, std::move(reason)};
   };
-  // A dashpot shortens the step: leapfrog with the closing speed extrapolated to the whole step is stable while h² + 8 ζ h ≤ 4, h = ω Δt.
-  const auto share_left = [](double zeta) { return std::sqrt(1 + 4 * zeta * zeta) - 2 * zeta; };
   for (const auto of : scene.particle_materials()) {
     const auto& material = scene.materials[of];
     const double radius = scene.smallest_radius(of);
-    if (material.shear_modulus > 0) {
-      // The Rayleigh time says nothing of dashpots. A fifth of it leaves room for those of e = 0.7; stronger ones take their share: a bed of
-      // e = 0.3 settles at 0.13 of the Rayleigh time with a step_ratio of 0.8, at 0.2 with 1.1.
-      double room = 1;
-      for (std::size_t other = 0; other < scene.materials.size(); ++other)
-        room = std::min(room, 1.5 * share_left(scene.pair(of, other).hertz_damping / 2));
-      consider(room * M_PI * radius * std::sqrt(material.density / material.shear_modulus) / (0.1631 * material.poisson + 0.8766),
-               fmt::format("Rayleigh time of {} {} of {:.4g} m{}", material.name, scene.dimension == 2 ? "discs" : "spheres",
-                           2 * radius, room < 1 ? ", shortened for the dashpots" : ""));
-    }
-    const double mass = material.density * volume_of(scene.dimension, radius);
-    for (std::size_t other = 0; other < scene.materials.size(); ++other) {
-      const auto& pair = scene.pair(of, other);
-      if (pair.stiffness <= 0) continue;
-      // A dense packing, its stiffness spread over all directions: twelve spheres or six discs around one. It moves, or it turns against
-      // its tangential springs; m r²/I is 5/2 for spheres and 2 for discs.
-      const double contacts = scene.dimension == 2 ? 6 : 12, turning = scene.dimension == 2 ? 2 : 2.5;
-      const double shear = pair.laws.tangential == LinearSlider::name ? pair.stiffness / pair.tangential_values[0] : 0;
-      const double across = scene.dimension - 1;
-      const double moving = (pair.stiffness + across * shear) / scene.dimension, rolling = turning * across / scene.dimension * shear;
-      const double omega = std::sqrt(2 * contacts * std::max(moving, rolling) / mass);
-      consider(2 / omega * share_left(std::sqrt(contacts / scene.dimension) * pair.damping_ratio),
-               fmt::format("springs of {} {} of {:.4g} m against {}", material.name, scene.dimension == 2 ? "discs" : "spheres",
-                           2 * radius, scene.materials[other].name));
-    }
+    if (!(radius > 0)) continue;
+    const auto particles = fmt::format("{} {} of {:.4g} m", material.name, scene.dimension == 2 ? "discs" : "spheres", 2 * radius);
+    if (material.shear_modulus > 0)
+      consider(M_PI * radius * std::sqrt(material.density / material.shear_modulus) / (0.1631 * material.poisson + 0.8766),
+               "Rayleigh time of " + particles);
+    bool hertz = false;
+    for (std::size_t other = 0; other < scene.materials.size(); ++other) hertz = hertz || scene.pair(of, other).laws.normal == Hertz::name;
+    if (hertz) consider(5 * limit_in_packing(scene, of, 0.01), "five times the limit of " + particles + " squeezed by 1 % of their radius");
+    else consider(limit_in_packing(scene, of, 0.05), "springs and dashpots of a dense packing of " + particles);
   }
   return critical;
 }

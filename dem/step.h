@@ -9,13 +9,14 @@ namespace acopla::dem {
 
 struct CriticalStep {
   double seconds = 0;  ///< the shortest of all limits [s]
-  std::string reason;  ///< which limit it is, e.g. "Rayleigh wave through glass spheres of 0.04 m"
+  std::string reason;  ///< which limit it is, e.g. "Rayleigh time of glass spheres of 0.04 m"
 };
 
-/// The critical step of a scene before it runs: the Rayleigh time of the particles' materials,
-/// T_R = π r sqrt(ρ/G) / (0.1631 ν + 0.8766), where they have elastic constants, less for strong dashpots; and for linear springs
-/// (2/ω)(sqrt(1 + 4 ζ²) − 2 ζ) with ω² = 2 Σ k_c / (D m) over the neighbours of a dense packing in D dimensions and ζ of all their
-/// dashpots together. While it runs, Engine::step_ratio() bounds the limit over the contacts there are.
+/// The critical step of a scene before it runs. With springs whose stiffness does not depend on the overlap it is the stability limit of
+/// leapfrog (dem/stability.h) in a dense packing of the smallest particles in a corner of the walls, all springs and dashpots of their laws
+/// together. With Hertz it is the Rayleigh time of the particles' materials, T_R = π r sqrt(ρ/G) / (0.1631 ν + 0.8766), of which one takes
+/// a fifth, or less where a fifth would not be stable in such a packing squeezed to an overlap of 1 % of the radius. While the scene runs,
+/// Engine::step_ratio() tells the limit of the contacts there are.
 CriticalStep critical_step(const Scene& scene);
 
 /// The step of a scene before windows divide it: `step`, or step_fraction × critical.
