@@ -195,7 +195,7 @@ void limits() {
               overlap);
         const int edge = dimension == 2 ? (quick ? 5 : 7) : (quick ? 3 : 4);
         auto& bed = beds[{dimension, laws.normal}];
-        if (bed.bodies.empty()) bed = squeezed_bed(s, edge, 0.02, 11);
+        if (bed.bodies.empty()) bed = squeezed_bed(s, edge, 0.01, 11);
         if (!bed.at_rest) throw std::runtime_error("the squeezed bed does not come to rest");
         limit("squeezed bed", s, bed.bodies, box(dimension, bed.side), bed.side, bed.mean_overlap);
       }

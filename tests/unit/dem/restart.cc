@@ -59,7 +59,7 @@ TEST(Restart, ContinuesBitByBitBetweenRebuildsWithSlidingContacts) {
     EXPECT_EQ(whole->energy().drift, continued->energy().drift);
     EXPECT_EQ(whole->rebuilds(), continued->rebuilds());
     EXPECT_GT(whole->rebuilds(), rebuilds);
-    EXPECT_GT(whole->contact_count(), 150u);
+    EXPECT_GT(whole->contact_count(), 100u);
   }
 }
 

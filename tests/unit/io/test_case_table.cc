@@ -129,6 +129,7 @@ TEST(CaseTable, AChoiceNamesAllAndTheNearest) {
 TEST(CaseTable, NearestWords) {
   EXPECT_EQ(nearest_word("fricton", {"density", "friction"}).value_or(""), "friction");
   EXPECT_EQ(nearest_word("rte", {"name", "rate"}).value_or(""), "rate");
+  EXPECT_EQ(nearest_word("form", {"from", "until"}).value_or(""), "from");
   EXPECT_FALSE(nearest_word("rate", {"name", "region"}).has_value());
   EXPECT_FALSE(nearest_word("zzz", {"density", "friction"}).has_value());
   EXPECT_FALSE(nearest_word("x", {}).has_value());
