@@ -60,7 +60,9 @@ Outcome run(Setting s, const std::vector<Body>& bodies, const std::vector<dem::W
   s.ledger = guard != Guard::plain;
   s.allow_unstable = guard == Guard::none;
   Outcome outcome;
-  const auto engine = engine_of(scene_of(s, reach), bodies, walls);
+  auto scene = scene_of(s, reach);
+  s.ledger = scene.keeps_ledger = s.ledger || dem::watches_energy(scene, step);
+  const auto engine = engine_of(std::move(scene), bodies, walls);
   constexpr std::uint64_t window = 200;
   double start = 0, scale = 0;
   bool beyond = false;
@@ -102,7 +104,7 @@ Outcome run(Setting s, const std::vector<Body>& bodies, const std::vector<dem::W
 std::string kind_of(const std::string& said) {
   if (said.empty()) return "";
   for (const auto& [part, word] : {std::pair{"step ratio", "step ratio"}, {"energy drifts", "energy"}, {"in one step", "travel"}, {"left the domain", "domain"},
-                                   {"pushed through", "wall"}, {"coincide", "coincident"}})
+                                   {"pushed through", "wall"}, {"coincide", "coincident"}, {"begin with", "overlap"}})
     if (said.find(part) != std::string::npos) return word;
   return "other";
 }

@@ -34,7 +34,9 @@ Energy EnergyLedger::balance(double kinetic, double gravity) {
   }
   energy.drift = present - start_;
   scale_ = std::max({scale_, energy.kinetic + energy.normal + energy.tangential + energy.rolling, std::abs(energy.lost()), std::abs(energy.wall_work)});
-  energy.relative_drift = scale_ > 0 ? std::abs(energy.drift) / scale_ : 0;
+  // What takes energy away must not give any: a loss below zero was made by the steps as well.
+  energy.made = -std::min({0.0, energy.lost_normal, energy.lost_sliding, energy.lost_rolling, energy.lost_damping});
+  energy.relative_drift = scale_ > 0 ? std::max(std::abs(energy.drift), energy.made) / scale_ : 0;
   return energy;
 }
 

@@ -15,7 +15,9 @@ struct Energy {
   double added = 0;                                     ///< brought by particles that came, less what the removed ones took along
   /// What the steps made or lost beyond all these: 0 for exact integration.
   double drift = 0;
-  /// |drift| over the largest energy that was ever stored or had been lost.
+  /// The largest loss below zero: friction, dashpots or damping that gave energy [J].
+  double made = 0;
+  /// The larger of |drift| and made, over the largest energy that was ever stored or had been lost.
   double relative_drift = 0;
 
   double stored() const { return kinetic + gravity + normal + tangential + rolling; }

@@ -83,6 +83,7 @@ void Engine::set_domain(const Scene& scene) {
 void Engine::advance(std::uint64_t steps, double step) {
   if (!started_) start();
   else if (outdated_) rebuild();
+  if (steps == 0) return;  // only the lists and the first forces
   loads_.begin();
   for (std::uint64_t k = 0; k < steps; ++k) {
     move(k == 0 ? 0.5 * step : step, step);
@@ -102,6 +103,7 @@ void Engine::start() {
   rebuild();
   loads_.begin_last();
   evaluate(0);
+  check_first_overlaps();
   for (auto& partition : partitions_) complete_forces(partition);
   started_ = true;
   if (keeps_ledger_) energy();
@@ -394,6 +396,20 @@ void Engine::check_domain() const {
           "widen `domain`.", particles_.id[i], time_, x[0], x[1], x[2]));
 }
 
+// Deeper than half a radius is no contact: its energy would throw the two apart.
+void Engine::check_first_overlaps() const {
+  if (allow_unstable_) return;
+  for_each_pair([&](std::uint32_t i, std::uint32_t j, double overlap) {
+    const double depth = overlap / std::min(particles_.radius_of(i), particles_.radius_of(j));
+    if (depth <= 0.5) return;
+    const Vec3 x = particles_.position[i].vector();
+    throw std::runtime_error(fmt::format(
+        "particles {} and {} begin with an overlap of {:.2g} of the smaller one's radius, at ({:.4g}, {:.4g}, {:.4g}) m. Put them apart, or "
+        "say allow_unstable_step = true.",
+        particles_.id[i], particles_.id[j], depth, x[0], x[1], x[2]));
+  });
+}
+
 void Engine::stop_at_fastest(double step) const {
   std::size_t worst = 0;
   double fastest = -1;
@@ -422,7 +438,8 @@ void Engine::check_energy(double step) {
       "the energy drifts: at t = {:.6g} s the steps have {} {:.3g} J that no mechanism accounts for, {:.2g} of what the scene held "
       "(limit {:.2g}). {} The stiffest contacts are those of particle {} at ({:.4g}, {:.4g}, {:.4g}) m, where the step is {:.2f} of the "
       "stability limit.",
-      time_, balance.drift > 0 ? "made" : "lost", std::abs(balance.drift), balance.relative_drift, drift_limit_,
+      time_, balance.drift > 0 || balance.made > -balance.drift ? "made" : "lost", std::max(std::abs(balance.drift), balance.made),
+      balance.relative_drift, drift_limit_,
       ratio.value > 0.5 ? "The step is too long: lower step_fraction." : "The contacts are resolved too coarsely: lower step_fraction, or soften them.",
       particles_.size() ? particles_.id[ratio.particle] : 0, x[0], x[1], x[2], ratio.value));
 }

@@ -151,6 +151,7 @@ class Engine {
   }
   void stop_at_fastest(double step) const;
   void check_domain() const;
+  void check_first_overlaps() const;
   void check_energy(double step);
 
   Vec3 gravity_;

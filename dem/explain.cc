@@ -99,8 +99,9 @@ std::string left_out(const Scene& scene, std::size_t meshes, std::size_t planes)
 }  // namespace
 
 std::string explain(const io::Table& root, const std::string& name) {
-  const auto scene = read_scene(root, name);
+  auto scene = read_scene(root, name);
   const double limit = largest_step(scene, root.table(name));
+  scene.keeps_ledger |= watches_energy(scene, limit);
   const auto critical = critical_step(scene);
   const double end = root.number("end", io::positive);
   const auto coupling = root.table_or_empty("coupling");

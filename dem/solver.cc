@@ -15,7 +15,10 @@
 namespace acopla::dem {
 
 Solver::Solver(const io::Table& root, const std::string& name)
-    : scene_(read_scene(root, name)), largest_step_(dem::largest_step(scene_, root.table(name))) {}
+    : scene_(read_scene(root, name)), largest_step_(dem::largest_step(scene_, root.table(name))) {
+  // A scene at the default step does not pay for this.
+  if (watches_energy(scene_, largest_step_)) scene_.keeps_ledger = true;
+}
 
 std::size_t Solver::wall_of(const std::string& surface) const {
   std::vector<std::string> names;

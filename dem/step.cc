@@ -93,6 +93,10 @@ CriticalStep critical_step(const Scene& scene) {
   return critical;
 }
 
+bool watches_energy(const Scene& scene, double step) {
+  return !scene.allow_unstable_step && step >= 0.5 * (1 - 1e-12) * critical_step(scene).seconds;
+}
+
 double largest_step(const Scene& scene, const io::Table& table) {
   const auto critical = critical_step(scene);
   if (!scene.step) return scene.step_fraction * critical.seconds;

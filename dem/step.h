@@ -19,6 +19,10 @@ struct CriticalStep {
 /// Engine::step_ratio() tells the limit of the contacts there are.
 CriticalStep critical_step(const Scene& scene);
 
+/// Whether a run keeps the energy ledger without being asked. From half the critical step on an impact may make energy while all contacts that
+/// last are still stable; the ledger sees that and stops the run. With allow_unstable_step nothing is watched.
+bool watches_energy(const Scene& scene, double step);
+
 /// The step of a scene before windows divide it: `step`, or step_fraction × critical.
 /// @throws io::UserError when it is above critical and the case does not insist
 double largest_step(const Scene& scene, const io::Table& table);

@@ -153,13 +153,21 @@ class KernelOf final : public Kernel {
     history.closing_speed = half_step;
     typename Model::template Response<Pack> r;
     if constexpr (ledger) {
+      using std::max;
       ContactEnergy<DoublePack> energy;
+      // A force works over the mean of the half steps before and after it. What all forces on the two bodies do in a step is known from the
+      // last one, so only the change of this force since then is missing: its value then, with the overlap and the speed of then.
+      const auto is_new = before == DoublePack(0.0);
+      Pack then = k;
+      then.overlap = max(DoublePack(0.0), k.overlap - k.step * half_step);
+      then.closing_speed = before;
+      auto normal_history = history.normal;
+      const DoublePack earlier = select(is_new, DoublePack(0.0), Model::Normal::force(then, parameters.normal, normal_history));
       r = Model::respond(k, parameters, history, &energy);
-      // A force works over the mean of the half steps before and after it, and what is after it is slower by F Δt/m*. The other forces on
-      // the two bodies are left out here, but where they balance this one no dashpot works. 1 + m r²/I is 3 for discs, 3.5 for spheres.
+      // In the tangential direction the whole force is taken for its change: 1 + m r²/I is 3 for discs, 3.5 for spheres.
       constexpr double turning = dimension == 2 ? 3 : 3.5;
       const DoublePack late = 0.5 * k.step / k.reduced_mass;
-      energy.normal_dashpot = energy.normal_dashpot + energy.viscous * (half_step - late * r.normal - k.closing_speed);
+      energy.normal_dashpot = energy.normal_dashpot - energy.viscous * late * (r.normal - earlier);
       energy.tangential_work = energy.tangential_work - (k.step * turning) * late * energy.viscous_shear;
       add(*total, energy, weight);
     } else {
