@@ -1,0 +1,35 @@
+// Looks now and then whether the step is still below the stability limit of the contacts there are.
+#pragma once
+
+#include <cstdint>
+
+#include "dem/engine.h"
+
+namespace acopla::dem {
+
+class StepWatch {
+ public:
+  explicit StepWatch(const Scene& scene) : knob_(scene.step ? "step" : "step_fraction"), allow_unstable_(scene.allow_unstable_step) {}
+  /// To be called between windows. The ratio takes as long as some steps: it is looked at when first called and then every two hundred steps.
+  /// @param steps  made since the start
+  /// @throws std::runtime_error  that says when, where and by how much the step was too long twice in a row
+  void look(const Engine& engine, double step, std::uint64_t steps);
+  /// Of the last look: the step over the limit, or over a safe bound of it; 0 without contacts.
+  double ratio() const { return ratio_; }
+
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("checked_at", checked_at_);
+    archive("ratio", ratio_);
+    archive("beyond", beyond_);
+  }
+
+ private:
+  const char* knob_;
+  bool allow_unstable_;
+  std::uint64_t checked_at_ = 0;
+  double ratio_ = 0;
+  bool beyond_ = false;
+};
+
+}  // namespace acopla::dem
