@@ -376,7 +376,7 @@ Vec3 Engine::momentum() const {
 
 Energy Engine::energy() { return ledger_.balance(kinetic_energy(), potential_energy()); }
 
-StepRatio Engine::step_ratio(double step) const {
+StabilityEstimate Engine::stability(double step) const {
   StabilityEstimate estimate(particles_, step);
   for_each_pair([&](std::uint32_t i, std::uint32_t j, double overlap) {
     estimate.add_pair(i, j, overlap, kernels_.of(particles_.material[i], particles_.material[j]));
@@ -384,7 +384,7 @@ StepRatio Engine::step_ratio(double step) const {
   for (const auto& partition : partitions_)
     partition.walls.for_each_contact([&](std::uint32_t i, std::uint8_t material, std::uint8_t wall, double overlap, const Vec3& normal,
                                          double curvature) { estimate.add_wall(i, overlap, normal, curvature, kernels_.of(material, wall)); });
-  return estimate.ratio();
+  return estimate;
 }
 
 void Engine::check_domain() const {

@@ -71,9 +71,11 @@ TEST(StepWatch, StopsWhoStaysBeyondTheLimitAndNotWhoPasses) {
   EXPECT_NEAR(watch.ratio(), 1.2, 1e-12);
   watch.look(*engine, 0.5 * limit(0), 201);
   watch.look(*engine, long_step, 401);
-  watch.look(*engine, long_step, 600);  // too soon: not looked at
+  EXPECT_LT(watch.ratio(), 1) << "the second look was good: the next is after 400 steps";
+  watch.look(*engine, long_step, 601);
+  watch.look(*engine, long_step, 800);  // too soon: not looked at
   try {
-    watch.look(*engine, long_step, 601);
+    watch.look(*engine, long_step, 801);
     FAIL() << "nothing was said";
   } catch (const std::runtime_error& error) {
     const std::string said = error.what();
