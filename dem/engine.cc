@@ -252,8 +252,8 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
 void Engine::refresh(const SavedPairs* saved) {
   if (!saved && refreshes_ > 0) {
     // Searching costs about as much as computing a fifth of the pairs; each hundredth of a radius adds some pairs in a hundred.
-    if (steps_since_refresh_ < 5) near_skin_ = std::min(1.3 * near_skin_, 0.25 * skin_);
-    else if (steps_since_refresh_ > 20) near_skin_ = std::max(0.8 * near_skin_, 1e-4 * smallest_);
+    if (steps_since_refresh_ < 4) near_skin_ = std::min(1.3 * near_skin_, 0.25 * skin_);
+    else if (steps_since_refresh_ > 12) near_skin_ = std::max(0.8 * near_skin_, 1e-4 * smallest_);
   }
   team_.run(static_cast<unsigned>(partitions_.size()), [&](unsigned p) {
     auto& partition = partitions_[p];
