@@ -247,13 +247,11 @@ def growth(study, own, tile):
     # writes the last two; the pass over the particles reads those and the position of the last rebuild and writes the five; every pair reads
     # its indices and reads and writes its history.
     moved = 32 * (7 + 11) + last["near"] / last["particles"] * (8 + 2 * 40)
-    least = moved / rate
-    study.at_most(f"Time of a particle-step at {last['particles']} spheres over that to stream its {moved:.0f} bytes at {rate:.1f} GB/s", "≥ 1",
-                  last["ns_particle"] / least, 2, "{:.2f}")
     study.table("Growth with the number of particles: one core", ["bed", *SHOWN, "MB at work"],
                 [[f"{nx} × {ny} tiles", *shown(m), f"{m['heap_particle'] * m['particles'] / 1e6:.1f}"] for (nx, ny), m in zip(sides, measured)])
     study.text(f"A particle-step's time grows as N^{exponent:.3f} from {measured[0]['particles']} to {measured[-1]['particles']} spheres. What rise there is, is the "
-               f"memory's: a copy of 256 MB in this run moved {rate:.1f} GB/s, read and written; {caches()}. Tiles rub against each other at their seams until they have settled, so the larger beds rebuild more often than a bed "
+               f"memory's: {caches()}. A step of {last['particles']} spheres has to move {moved:.0f} bytes a particle, {moved / rate:.0f} ns at the "
+               f"{rate:.1f} GB/s of a copy of 256 MB in this run; it takes {last['ns_particle'] * rate / moved:.1f} times that. Tiles rub against each other at their seams until they have settled, so the larger beds rebuild more often than a bed "
                "that settled as one; the single tile has more walls.")
     return measured
 
@@ -287,7 +285,6 @@ def triangles(study, own, tile):
         texts[wanted] = beds.spheres(size, tile, floor=beds.mesh_floor(path))
     best, each = in_turn(own, {wanted: ((text,), options) for wanted, text in texts.items()}, 1 if study.quick else 3)
     over = {wanted: median(m["ns_particle"] / plane["ns_particle"] for m, plane in zip(each[wanted], each[0])) for wanted in texts}
-    study.at_most(f"Cost of a bed on {best[floors[-1]]['triangles']} triangles over that on {best[100]['triangles']}", "–", over[floors[-1]] / over[100], 2, "{:.2f}")
     study.table("Triangles under the same bed: one core", ["floor", "ns a particle-step", "over the plane", "bytes a triangle", "spheres on walls"],
                 [[f"{m['triangles']} triangles" if m["triangles"] else "plane", f"{m['ns_particle']:.1f}", f"{over[wanted]:.2f}",
                   f"{m['bytes_triangle']:.0f}" if m["triangles"] else "–", m["on_walls"]] for wanted, m in best.items()])

@@ -210,7 +210,7 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
   // The skin follows the motion: a list that lasts long may be tighter, one that does not must be looser.
   if (rebuilds_ > 0 && !outdated_) {
     if (steps_since_rebuild_ < 20) skin_ = std::min(1.2 * skin_, 0.8 * smallest_);
-    else if (steps_since_rebuild_ > 200) skin_ = std::max(0.85 * skin_, 0.08 * smallest_);
+    else if (steps_since_rebuild_ > 400) skin_ = std::max(0.85 * skin_, 0.08 * smallest_);
   }
   saved_pairs_.clear();
   saved_walls_.clear();

@@ -29,7 +29,7 @@ void StepWatch::look(const Engine& engine, double step, std::uint64_t steps) {
   // A hard impact may pass the limit for some steps, in which nothing can grow; who is still beyond it two hundred steps later stays there.
   const bool again = beyond_;
   beyond_ = found.value > 1;
-  pause_ = beyond_ ? 200 : std::min<std::uint64_t>(2 * pause_, 2000);
+  pause_ = beyond_ && !allow_unstable_ ? 200 : std::clamp<std::uint64_t>(3 * steps, 200, 5000);
   if (!beyond_ || !again || allow_unstable_) return;
   const Vec3 x = engine.particles().position[found.particle].vector();
   throw std::runtime_error(fmt::format(

@@ -10,8 +10,8 @@ namespace acopla::dem {
 class StepWatch {
  public:
   explicit StepWatch(const Scene& scene) : knob_(scene.step ? "step" : "step_fraction"), allow_unstable_(scene.allow_unstable_step) {}
-  /// To be called between windows. The bound takes as long as some steps: it is looked at when first called and then after 200 steps,
-  /// 400 and so on up to 2000; after 200 where it was beyond the limit.
+  /// To be called between windows. The bound takes as long as some steps: it is looked at when first called and then when four
+  /// times as many steps are made, at most 5000 later; 200 later where it was beyond the limit.
   /// @param steps  made since the start
   /// @throws std::runtime_error  that says when, where and by how much the step was too long twice in a row
   void look(const Engine& engine, double step, std::uint64_t steps);
@@ -32,7 +32,7 @@ class StepWatch {
  private:
   const char* knob_;
   bool allow_unstable_;
-  std::uint64_t checked_at_ = 0, pause_ = 100;
+  std::uint64_t checked_at_ = 0, pause_ = 200;
   double ratio_ = 0;
   bool beyond_ = false;
   double limit_ = 0, limit_bound_ = 0;  // the last limit, and the bound of that time

@@ -70,12 +70,12 @@ TEST(StepWatch, StopsWhoStaysBeyondTheLimitAndNotWhoPasses) {
   watch.look(*engine, long_step, 1);
   EXPECT_NEAR(watch.ratio(), 1.2, 1e-12);
   watch.look(*engine, 0.5 * limit(0), 201);
-  watch.look(*engine, long_step, 401);
-  EXPECT_LT(watch.ratio(), 1) << "the second look was good: the next is after 400 steps";
-  watch.look(*engine, long_step, 601);
-  watch.look(*engine, long_step, 800);  // too soon: not looked at
+  watch.look(*engine, long_step, 803);
+  EXPECT_LT(watch.ratio(), 1) << "the second look was good: the next is three times as many steps later";
+  watch.look(*engine, long_step, 804);
+  watch.look(*engine, long_step, 1003);  // too soon: not looked at
   try {
-    watch.look(*engine, long_step, 801);
+    watch.look(*engine, long_step, 1004);
     FAIL() << "nothing was said";
   } catch (const std::runtime_error& error) {
     const std::string said = error.what();
