@@ -9,7 +9,7 @@ namespace acopla::fem {
 namespace {
 
 Mesh make_mesh(const Settings& settings) {
-  Mesh mesh(settings.mesh, settings.degree, settings.dimension);
+  Mesh mesh(settings.mesh.make(), settings.degree);
   if (mesh.element().simplex && settings.formulation.locking == Formulation::Locking::b_bar)
     settings.table.fail(
         "locking",

@@ -39,7 +39,7 @@ std::vector<Settings::MaterialOfPart> read_materials(const io::Table& structure,
   for (const auto& [name, part] : table.named_tables()) {
     const auto group = part.text("on", name);
     try {
-      find_group(settings.groups, group, settings.dimension);
+      find_group(settings.mesh.groups, group, settings.dimension);
     } catch (const std::invalid_argument& error) {
       if (part.has("on"))
         part.fail("on", fmt::format("names \"{}\", which {}", group, error.what()));
@@ -87,7 +87,7 @@ Settings::Support read_move(const io::Table& table, const Settings& settings) {
                           : "says no motion. Give it a displacement [m] or a velocity [m/s].");
   Settings::Support support{
       .table = table,
-      .part = read_part(table, settings.groups, settings.dimension, settings.dimension - 1),
+      .part = read_part(table, settings.mesh.groups, settings.dimension, settings.dimension - 1),
       .directions = read_directions(table, settings.dimension),
       .moves = true,
       .value = table.vector(velocities ? "velocity" : "displacement", settings.dimension),
@@ -101,7 +101,7 @@ std::vector<Settings::Support> read_supports(const io::Table& table, const Setti
     for (const auto& [name, fix] : table.table("fix").named_tables())
       supports.push_back(
           {.table = fix,
-           .part = read_part(fix, settings.groups, settings.dimension, settings.dimension - 1),
+           .part = read_part(fix, settings.mesh.groups, settings.dimension, settings.dimension - 1),
            .directions = read_directions(fix, settings.dimension),
            .moves = false,
            .value = Vec3::Zero(),
@@ -202,13 +202,12 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   settings.dimension = static_cast<int>(root.integer("dimension", 2, 3));
   settings.motion = read_motion(table);
   settings.formulation = read_formulation(table, settings.dimension);
-  settings.mesh = table.path("mesh");
-  settings.groups = read_physical_groups(settings.mesh);
+  settings.mesh = read_mesh_choice(table, settings.dimension);
   settings.degree = static_cast<int>(table.integer("degree", 1, 2, 2));
   settings.materials = read_materials(table, settings);
   check_densities(settings);
   settings.supports = read_supports(table, settings);
-  settings.loads = read_loads(table, settings.groups, settings.dimension);
+  settings.loads = read_loads(table, settings.mesh.groups, settings.dimension);
   settings.solver = read_solver(table);
   const auto output = table.table_or_empty("output");
   settings.vtu = output.flag("vtu", true);

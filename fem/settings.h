@@ -12,6 +12,7 @@
 #include "fem/loads.h"
 #include "fem/mesh.h"
 #include "fem/part.h"
+#include "fem/shapes.h"
 #include "io/case_table.h"
 
 namespace acopla::fem {
@@ -48,8 +49,7 @@ struct Settings {
   io::Table table;   ///< for messages about what shows later, e.g. a structure left free
   int dimension = 3;
   Formulation formulation;
-  std::string mesh;  ///< absolute path
-  std::vector<PhysicalGroup> groups;
+  MeshChoice mesh;
   int degree = 2;
   std::vector<MaterialOfPart> materials;
   std::vector<Support> supports;
