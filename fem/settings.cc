@@ -214,6 +214,10 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   settings.every = output.optional_number("every", io::positive);
   settings.von_mises = output.flag("von_mises", !settings.motion);
   settings.energy = output.flag("energy", false);
+  settings.frequencies = static_cast<std::size_t>(output.integer("frequencies", 1, 1000, 0));
+  if (settings.frequencies > 0)
+    for (const auto& [part, group, material] : settings.materials)
+      if (!material.density) part.fail("has no density [kg/m3], which natural frequencies need.");
   if (settings.energy && !settings.motion)
     output.fail("energy", "belongs to analysis = \"dynamic\".");
   table.reject_unknown();

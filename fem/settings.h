@@ -59,6 +59,7 @@ struct Settings {
   bool vtu = true;
   std::optional<double> every;  ///< time between pictures [s]; empty: the last window only
   bool von_mises = true;        ///< report the largest von Mises stress of every window
+  std::size_t frequencies = 0;  ///< lowest natural frequencies to report at the end
   bool energy = false;          ///< report the energy balance of a structure in motion
 };
 

@@ -10,6 +10,7 @@
 #include "fem/cholesky.h"
 #include "fem/interface.h"
 #include "fem/model.h"
+#include "fem/modes.h"
 #include "fem/picture.h"
 #include "fem/statics.h"
 #include "fem/stress.h"
@@ -113,12 +114,29 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   }
   seconds_.setup = setup.seconds();
   const Stopwatch factor;
+  if (settings_.frequencies > 0) check_frequencies();
   if (body_->statics)
     body_->statics->prepare();
   else
     begin_motion();
   seconds_.factor = factor.seconds();
   return surfaces;
+}
+
+/// Before hours of a run that they would end in.
+void Structure::check_frequencies() const {
+  const auto output = settings_.table.table("output");
+  const auto& fixed = body_->model.supports.fixed();
+  const auto motions = free_motions(body_->model.mesh, fixed);
+  if (!motions.empty())
+    output.fail("frequencies",
+                "are asked of a structure that is free to " + motions + ". Fix more.");
+  const auto free = static_cast<std::size_t>(std::count(fixed.begin(), fixed.end(), 0));
+  if (4 * settings_.frequencies > free)
+    output.fail(
+        "frequencies",
+        fmt::format("asks for more than a quarter of the {} free unknowns. Refine the mesh.",
+                    free));
 }
 
 /// Equilibrium under weight and the loads at t = 0, or rest; and the factor of the first step.
@@ -293,6 +311,20 @@ std::vector<std::pair<std::string, double>> Structure::finish() {
     result.emplace_back("residual", worst_residual_);
   else
     result.emplace_back("factorisations", static_cast<double>(body_->dynamics->factorisations()));
+  for (auto& frequency : frequencies()) result.push_back(std::move(frequency));
+  return result;
+}
+
+std::vector<std::pair<std::string, double>> Structure::frequencies() const {
+  std::vector<std::pair<std::string, double>> result;
+  if (settings_.frequencies == 0) return result;
+  const auto& [mesh, materials, supports, loads] = body_->model;
+  const auto mass =
+      assemble_mass(mesh, materials, settings_.formulation, body_->stiffness.pattern());
+  const auto modes = natural_modes(mesh, body_->stiffness, mass, supports.fixed(),
+                                   settings_.frequencies, settings_.solver);
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    result.emplace_back(fmt::format("frequency.{}", m + 1), modes[m].frequency);
   return result;
 }
 

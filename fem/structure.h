@@ -45,6 +45,8 @@ class Structure : public protocol::Participant {
   Response equilibrate(const protocol::Window& window, const Vector& force);
   Response move(const protocol::Window& window, const Vector& force);
   void begin_motion();
+  void check_frequencies() const;
+  std::vector<std::pair<std::string, double>> frequencies() const;
   std::vector<std::pair<std::string, double>> quantities(const Response& response) const;
   std::vector<protocol::Field> fields() const;
   bool is_due(const protocol::Window& window) const;

@@ -1,6 +1,7 @@
 // A structure in motion as a participant of a coupling.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 
 #include "fem/structure.h"
@@ -83,7 +84,8 @@ TEST_F(AMovingStructure, FallsWhenNothingHoldsIt) {
     EXPECT_NEAR(u[2], -gravity * 50 * step * step, 1e-10 * gravity * 50 * step * step);
 }
 
-// The trapezoidal rule: displacement is the mean of the velocities times the step, to the round-off of its own sum.
+// The trapezoidal rule: displacement is the mean of the velocities times the step, to the round-off
+// of its own sum.
 TEST_F(AMovingStructure, SendsDisplacementAndVelocityOfItsSurfaces) {
   auto structure = make();
   const auto force = pressure(structure.start(run(0)), 1e4);
@@ -171,6 +173,33 @@ TEST_F(AMovingStructure, IsRefusedWithoutWhatMotionNeeds) {
   auto text = case_of(mesh_, "step = 1\n");
   text.replace(text.find("dynamic"), 7, "static");
   expect(text, {"structure.step belongs to analysis = \"dynamic\""});
+}
+
+// Frequencies on request: a clamped block of 2 × 1 × 0.5 m has its shear mode along x first, above
+// sqrt(G/ρ)/(4 h) of a layer less bending.
+TEST_F(AMovingStructure, TellsItsNaturalFrequenciesAtTheEnd) {
+  auto structure = make("", "[structure.fix.z0]\n[structure.output]\nfrequencies = 3\n");
+  structure.start(run());
+  structure.advance(window(0), {});
+  std::map<std::string, double> found;
+  for (const auto& [name, value] : structure.finish()) found[name] = value;
+  const double layer = std::sqrt(1e9 / 2.4 / density) / (4 * 0.5);
+  EXPECT_GT(found.at("frequency.1"), 0.5 * layer);
+  EXPECT_LT(found.at("frequency.1"), layer);
+  EXPECT_LE(found.at("frequency.1"), found.at("frequency.2"));
+  EXPECT_LE(found.at("frequency.2"), found.at("frequency.3"));
+  EXPECT_EQ(found.count("frequency.4"), 0u);
+  const auto many =
+      failure(case_of(mesh_, "", "[structure.fix.z0]\n[structure.output]\nfrequencies = 90\n"));
+  EXPECT_NE(
+      many.find(
+          "structure.output.frequencies asks for more than a quarter of the 300 free unknowns"),
+      std::string::npos)
+      << many;
+  const auto loose =
+      failure(case_of(mesh_, "start = \"rest\"\n", "[structure.output]\nfrequencies = 1\n"));
+  EXPECT_NE(loose.find("frequencies are asked of a structure that is free to"), std::string::npos)
+      << loose;
 }
 
 TEST_F(AMovingStructure, IsExplained) {
