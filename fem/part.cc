@@ -40,9 +40,9 @@ bool in_arc(const Mesh& mesh, const BoundaryFace& face, const Part::Arc& arc, co
   for (std::size_t i = 0; i < corners; ++i)
     middle += mesh.points()[face.nodes[i]] / static_cast<double>(corners);
   const double angle = std::atan2(middle[1] - centre[1], middle[0] - centre[0]);
-  const double turn = 360 * degree;
-  const double beyond = std::fmod(std::fmod(angle - arc.from, turn) + turn, turn);
-  return beyond <= arc.to - arc.from;
+  constexpr double turn = 360 * degree, slack = 1e-9;  // a middle on the arc's end is in it
+  const double beyond = std::fmod(std::fmod(angle - arc.from + slack, turn) + turn, turn);
+  return beyond <= arc.to - arc.from + 2 * slack;
 }
 
 Vec3 middle_of(const Mesh& mesh) {

@@ -187,6 +187,14 @@ std::optional<Settings::Motion> read_motion(const io::Table& table) {
   return motion;
 }
 
+std::vector<Settings::Probe> read_probes(const io::Table& output, int dimension) {
+  std::vector<Settings::Probe> probes;
+  if (!output.has("point")) return probes;
+  for (const auto& [name, table] : output.table("point").named_tables())
+    probes.push_back({table, name, table.vector("at", dimension), table.flag("stress", false)});
+  return probes;
+}
+
 void check_densities(const Settings& settings) {
   if (!settings.motion) return;
   for (const auto& [table, group, material] : settings.materials)
@@ -214,6 +222,8 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   settings.every = output.optional_number("every", io::positive);
   settings.von_mises = output.flag("von_mises", !settings.motion);
   settings.energy = output.flag("energy", false);
+  settings.probes = read_probes(output, settings.dimension);
+  settings.reactions = output.flag("reactions", false);
   settings.frequencies = static_cast<std::size_t>(output.integer("frequencies", 1, 1000, 0));
   if (settings.frequencies > 0)
     for (const auto& [part, group, material] : settings.materials)

@@ -36,6 +36,13 @@ struct Settings {
     std::string group;
     Material material;
   };
+  /// A node whose motion, and stress where asked for, is reported of every window.
+  struct Probe {
+    io::Table table;
+    std::string name;
+    Vec3 at;  ///< [m]; the nearest node is taken
+    bool stress = false;
+  };
   /// Of a dynamic analysis.
   struct Motion {
     Scheme scheme;
@@ -59,6 +66,8 @@ struct Settings {
   bool vtu = true;
   std::optional<double> every;  ///< time between pictures [s]; empty: the last window only
   bool von_mises = true;        ///< report the largest von Mises stress of every window
+  std::vector<Probe> probes;
+  bool reactions = false;       ///< report the reaction of each support
   std::size_t frequencies = 0;  ///< lowest natural frequencies to report at the end
   bool energy = false;          ///< report the energy balance of a structure in motion
 };

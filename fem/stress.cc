@@ -1,6 +1,7 @@
 #include "fem/stress.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,13 @@ double von_mises(const StressVector& s) {
   const double normal =
       (s[0] - s[1]) * (s[0] - s[1]) + (s[1] - s[2]) * (s[1] - s[2]) + (s[2] - s[0]) * (s[2] - s[0]);
   return std::sqrt(0.5 * normal + 3 * s.tail<3>().squaredNorm());
+}
+
+Vec3 principal(const StressVector& s) {
+  Eigen::Matrix3d tensor;
+  tensor << s[0], s[5], s[4], s[5], s[1], s[3], s[4], s[3], s[2];
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tensor, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().reverse();
 }
 
 Stress::Stress(const Mesh& mesh, Materials materials, const Formulation& formulation)
@@ -118,6 +126,17 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> Stress::nodal(const Vector& u) const {
   }
   for (Eigen::Index n = 0; n < count; ++n) sum.col(n) /= std::max(1.0, cells[n]);
   return sum;
+}
+
+StressVector Stress::at_node(std::uint32_t node, const std::vector<std::size_t>& cells,
+                             const Vector& u) const {
+  StressVector sum = StressVector::Zero();
+  for (const auto c : cells) {
+    const auto nodes = mesh_.cell(c);
+    const auto a = std::find(nodes.begin(), nodes.end(), node) - nodes.begin();
+    sum += at_points(c, u) * mesh_.element().extrapolation.row(a).transpose();
+  }
+  return sum / std::max(1.0, static_cast<double>(cells.size()));
 }
 
 Vector Stress::nodal_von_mises(const Vector& u) const {

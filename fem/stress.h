@@ -16,6 +16,7 @@ struct Peak {
 using StressVector = Eigen::Matrix<double, 6, 1>;
 
 double von_mises(const StressVector& stress);  ///< [Pa]
+Vec3 principal(const StressVector& stress);    ///< descending [Pa]
 
 /// Stress recovery on one mesh. Keeps the inverse Jacobians of the stress points (72 bytes a point
 /// in 3D), so that a window costs two small products a cell. The mesh must outlive it.
@@ -31,6 +32,9 @@ class Stress {
   /// Stress at each node [Pa], [6, node]: extrapolated from the stress points and averaged over the
   /// cells that meet there.
   Eigen::Matrix<double, 6, Eigen::Dynamic> nodal(const Vector& u) const;
+  /// The same at one node; `cells` are those that meet there.
+  StressVector at_node(std::uint32_t node, const std::vector<std::size_t>& cells,
+                       const Vector& u) const;
   /// Von Mises stress of nodal() at each node [Pa].
   Vector nodal_von_mises(const Vector& u) const;
 

@@ -115,12 +115,78 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   seconds_.setup = setup.seconds();
   const Stopwatch factor;
   if (settings_.frequencies > 0) check_frequencies();
+  find_probes();
   if (body_->statics)
     body_->statics->prepare();
   else
     begin_motion();
   seconds_.factor = factor.seconds();
   return surfaces;
+}
+
+void Structure::find_probes() {
+  const auto& mesh = body_->model.mesh;
+  for (const auto& probe : settings_.probes) {
+    Probed probed{probe.name, mesh.nearest_node(probe.at), {}};
+    const double distance = (mesh.points()[probed.node] - probe.at).norm();
+    if (distance > 0.1 * mesh.extent())
+      probe.table.fail(
+          "at", fmt::format("is {:.3g} m away from the nearest node of the mesh.", distance));
+    for (std::size_t c = 0; probe.stress && c < mesh.cells(); ++c) {
+      const auto nodes = mesh.cell(c);
+      if (std::find(nodes.begin(), nodes.end(), probed.node) != nodes.end())
+        probed.cells.push_back(c);
+    }
+    probed_.push_back(std::move(probed));
+  }
+  if (!settings_.reactions) return;
+  // A node of two supports counts for the first that holds it.
+  std::vector<char> counted(mesh.unknowns(), 0);
+  const auto dimension = static_cast<std::size_t>(mesh.dimension());
+  for (const auto& support : settings_.supports) {
+    const auto& name = support.table.name();
+    supported_.push_back({name.substr(name.rfind('.') + 1), {}});
+    for (const auto node : nodes_of(support.part.faces(mesh)))
+      for (std::size_t d = 0; d < dimension; ++d) {
+        const auto unknown = dimension * node + d;
+        if (!support.directions[d] || counted[unknown]++) continue;
+        supported_.back().second.push_back(unknown);
+      }
+  }
+}
+
+void Structure::add_probes(std::vector<std::pair<std::string, double>>& result) const {
+  const int dimension = settings_.dimension;
+  static constexpr const char* voigt[] = {"xx", "yy", "zz", "yz", "xz", "xy"};
+  const auto add_vector = [&](const std::string& name, const Vector& nodal, std::uint32_t node) {
+    const Vec3 value = value_at(nodal, node, dimension);
+    for (int d = 0; d < dimension; ++d) result.emplace_back(name + "xyz"[d], value[d]);
+  };
+  for (const auto& [name, node, cells] : probed_) {
+    add_vector(name + ".displacement.", state_.motion.displacement, node);
+    if (settings_.motion) add_vector(name + ".velocity.", state_.motion.velocity, node);
+    if (cells.empty()) continue;
+    const auto stress = body_->stress.at_node(node, cells, state_.motion.displacement);
+    for (int i = 0; i < 6; ++i)
+      if (dimension == 3 || i < 3 || i == 5)
+        result.emplace_back(name + ".stress." + voigt[i], stress[i]);
+    const Vec3 principals = principal(stress);
+    for (int i = 0; i < 3; ++i)
+      result.emplace_back(fmt::format("{}.principal.{}", name, i + 1), principals[i]);
+    result.emplace_back(name + ".von_mises", von_mises(stress));
+  }
+}
+
+void Structure::add_reactions(const Vector& reaction,
+                              std::vector<std::pair<std::string, double>>& result) const {
+  const auto dimension = static_cast<std::size_t>(settings_.dimension);
+  for (const auto& [name, unknowns] : supported_) {
+    Vec3 sum = Vec3::Zero();
+    for (const auto unknown : unknowns)
+      sum[static_cast<int>(unknown % dimension)] += reaction[static_cast<Eigen::Index>(unknown)];
+    for (std::size_t d = 0; d < dimension; ++d)
+      result.emplace_back(name + ".reaction." + "xyz"[d], sum[static_cast<int>(d)]);
+  }
 }
 
 /// Before hours of a run that they would end in.
@@ -255,6 +321,8 @@ std::vector<std::pair<std::string, double>> Structure::quantities(const Response
     result.emplace_back("velocity.max", largest_length(state_.motion.velocity, dimension));
   if (settings_.von_mises)
     result.emplace_back("von_mises.max", body_->stress.peak(state_.motion.displacement).value);
+  add_reactions(response.reaction, result);
+  add_probes(result);
   if (settings_.energy) {
     const auto& [kinetic, strain, work, support_work, damping] = state_.passed;
     result.emplace_back("energy.kinetic", kinetic);

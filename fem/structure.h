@@ -47,6 +47,10 @@ class Structure : public protocol::Participant {
   void begin_motion();
   void check_frequencies() const;
   std::vector<std::pair<std::string, double>> frequencies() const;
+  void find_probes();
+  void add_probes(std::vector<std::pair<std::string, double>>& result) const;
+  void add_reactions(const Vector& reaction,
+                     std::vector<std::pair<std::string, double>>& result) const;
   std::vector<std::pair<std::string, double>> quantities(const Response& response) const;
   std::vector<protocol::Field> fields() const;
   bool is_due(const protocol::Window& window) const;
@@ -59,6 +63,12 @@ class Structure : public protocol::Participant {
     bool due = false;  ///< a picture of it is wanted
     bool drawn = true;
   };
+  /// A node that is reported, and the cells that meet there where its stress is.
+  struct Probed {
+    std::string name;
+    std::uint32_t node = 0;
+    std::vector<std::size_t> cells;
+  };
   struct Seconds {
     double setup = 0, factor = 0, solve = 0;
   };
@@ -67,6 +77,9 @@ class Structure : public protocol::Participant {
   protocol::Run run_;
   std::unique_ptr<Body> body_;
   std::vector<Coupled> coupled_;
+  std::vector<Probed> probed_;
+  std::vector<std::pair<std::string, std::vector<std::size_t>>>
+      supported_;  // unknowns of each support, when asked for
   State state_, saved_;
   double start_energy_ = 0;
   Seconds seconds_;

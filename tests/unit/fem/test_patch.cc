@@ -92,6 +92,8 @@ TEST(VonMises, OfUniaxialAndShearAndHydrostaticStress) {
   EXPECT_DOUBLE_EQ(von_mises(uniaxial), 3);
   EXPECT_DOUBLE_EQ(von_mises(shear), 2 * std::sqrt(3));
   EXPECT_DOUBLE_EQ(von_mises(hydrostatic), 0);
+  EXPECT_LT((principal(uniaxial) - Vec3(0, 0, -3)).norm(), 1e-15);
+  EXPECT_LT((principal(shear) - Vec3(2, 0, -2)).norm(), 1e-14);
 }
 
 }  // namespace

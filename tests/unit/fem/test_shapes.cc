@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "fem/faces.h"
+#include "fem/part.h"
 #include "fem/picture.h"
 #include "gmsh_writer.h"
 #include "io/error.h"
@@ -117,6 +118,25 @@ TEST(ACylinder, IsAnAnnulusWithAHeight) {
   EXPECT_NEAR(mesh.volume(), 9 * pi, 1e-5 * 9 * pi);  // 24 parabolas around
   expect_sides(mesh, {{"inside", 6 * pi}, {"outside", 12 * pi}, {"z0", 3 * pi}, {"z1", 3 * pi}},
                1e-5);
+}
+
+// An arc takes the faces whose middles lie in it, ends included: of 30 around, with middles at 6°,
+// 18°, …, those from 30° to 150° are 11; from 350° to 370°, past the x axis, two. `outside` is
+// meant where there is such a group.
+TEST(AnArc, HoldsTheFacesWithTheirMiddlesInIt) {
+  const auto mesh =
+      make("annulus = { inner = 0.04, outer = 0.05, centre = [0.6, 0.3], cells = [1, 30] }", 2);
+  const auto count = [&](const std::string& on) {
+    const auto root = io::Table::from_text("[load]\non = { arc = " + on + " }\n", "case.toml");
+    return read_part(root.table("load"), mesh.groups(), 2, 1).faces(mesh).size();
+  };
+  EXPECT_EQ(count("{ from = 30, to = 150 }"), 11u);
+  EXPECT_EQ(count("{ from = 350, to = 370 }"), 2u);
+  EXPECT_EQ(count("{ from = 0, to = 360 }"), 30u);
+  EXPECT_EQ(count("{ from = 30, to = 150, of = \"inside\" }"), 11u);
+  EXPECT_EQ(count("{ from = 80, to = 100, centre = [0.6, 0.2] }"),
+            6u);  // 5 of the top, 1 of the bottom
+  EXPECT_THROW(count("{ from = 150, to = 30 }"), io::UserError);
 }
 
 // The picture of a curved mesh has its middles on the circle: radii of 1, 1.5 and 2 and none in

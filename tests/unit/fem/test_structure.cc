@@ -103,6 +103,35 @@ TEST_F(AStructure, LeftFreeToMoveIsRefusedWithTheMotionsNamed) {
   }
 }
 
+// On request: a bar stretched along x between a fixed and a moved end. Stress σ = E ε of ν = 0,
+// nothing else; reactions at the two ends are opposite.
+TEST_F(AStructure, ReportsPointsAndTheReactionOfEachSupport) {
+  const auto text =
+      "dimension = 3\n[structure]\nmesh = { bar = { size = [2, 1, 0.5], cells = [4, 2, 2] } "
+      "}\n[structure.material]\nyoung = 1e9\n"
+      "poisson = 0\n[structure.fix.x0]\n[structure.move.x1]\ndisplacement = [1e-3, 0, "
+      "0]\n[structure.output]\nreactions = true\n"
+      "[structure.output.point.middle]\nat = [1, 0.5, 0.25]\nstress = "
+      "true\n[structure.output.point.end]\nat = [2, 0, 0]\n";
+  Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  protocol::Run alone = run();
+  alone.uses.clear();
+  structure.start(alone);
+  const auto found = quantities(structure.advance(window(0), {}));
+  const double stress = 1e9 * 0.5e-3;
+  EXPECT_NEAR(found.at("middle.displacement.x"), 0.5e-3, 1e-15);
+  EXPECT_NEAR(found.at("end.displacement.x"), 1e-3, 1e-15);
+  EXPECT_EQ(found.count("end.stress.xx"), 0u);
+  EXPECT_NEAR(found.at("middle.stress.xx"), stress, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.stress.xy"), 0, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.principal.1"), stress, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.principal.3"), 0, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.von_mises"), stress, 1e-10 * stress);
+  EXPECT_NEAR(found.at("x0.reaction.x"), -stress * 0.5, 1e-10 * stress);
+  EXPECT_NEAR(found.at("x1.reaction.x"), stress * 0.5, 1e-10 * stress);
+  EXPECT_NEAR(found.at("reaction.x"), 0, 1e-10 * stress);
+}
+
 TEST_F(AStructure, RefusesSurfacesAndFieldsItDoesNotHave) {
   auto missing = run();
   missing.uses[0].surface = "inside";
