@@ -8,8 +8,10 @@
 namespace acopla::fem {
 namespace {
 
-constexpr io::Range poisson_range{-1, 0.5, true, true,
-                                  "Poisson's ratio of a stable compressible solid lies there."};
+constexpr io::Range poisson_range{
+    -1, 0.5, true, true,
+    "Poisson's ratio of a stable compressible solid lies there; a rubber or undrained soil takes "
+    "0.4999 with locking = \"b_bar\"."};
 constexpr double gibibyte = 1ull << 30;
 /// Above it the volumetric strain of plain cells locks: errors of stress grow as 1 / (1 − 2 ν).
 constexpr double nearly_incompressible = 0.495;

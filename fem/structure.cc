@@ -432,6 +432,13 @@ std::string scheme_of(const Settings::Motion& motion) {
              : fmt::format("Newmark, β = {:.4g}, γ = {:.4g}", scheme.beta, scheme.gamma);
 }
 
+/// A mesh drawn in millimetres is a thousand times too large.
+std::string doubtful_size(const Mesh& mesh) {
+  if (mesh.extent() < 1000) return {};
+  return fmt::format("the mesh is {:.4g} m large. Lengths are metres: was it drawn in millimetres?",
+                     mesh.extent());
+}
+
 double mass_of(const Settings& settings, const Model& model) {
   double mass = 0;
   const Vector unit =
@@ -458,6 +465,7 @@ std::string explain(const Settings& settings) {
       std::count(fixed.begin(), fixed.end(), 1), surfaces_of(mesh),
       mesh.dimension() == 2 ? "area" : "volume", mesh.volume(), mesh.dimension() == 2 ? "m2" : "m3",
       mass > 0 ? fmt::format("mass {:.6g} kg", mass) : "no density, so no weight");
+  if (const auto doubt = doubtful_size(mesh); !doubt.empty()) text += "  warning: " + doubt + "\n";
   if (settings.motion) text += fmt::format("  time integration: {}\n", scheme_of(*settings.motion));
   text += fmt::format("  linear solver: {}, because {}\n",
                       solver.direct ? "direct (Cholesky, factored once)"

@@ -132,11 +132,14 @@ void Supports::claim(const Mesh& mesh, std::uint32_t node, int direction) {
   const auto& now = sources_.back();
   if (owner_[unknown] >= 0 && owner_[unknown] != index) {
     const auto& before = sources_[static_cast<std::size_t>(owner_[unknown])];
+    const auto stays = [&](const Source& source) {
+      return !source.moves || source.value[direction] == 0;
+    };
     const bool same =
-        now.moves == before.moves &&
-        (!now.moves || (now.value[direction] == before.value[direction] &&
-                        now.history.velocities == before.history.velocities &&
-                        now.history.amplitude.points() == before.history.amplitude.points()));
+        (stays(now) && stays(before)) ||
+        (now.moves && before.moves && now.value[direction] == before.value[direction] &&
+         now.history.velocities == before.history.velocities &&
+         now.history.amplitude.points() == before.history.amplitude.points());
     if (same) return;
     const auto& p = mesh.points()[node];
     throw std::invalid_argument(
@@ -146,7 +149,7 @@ void Supports::claim(const Mesh& mesh, std::uint32_t node, int direction) {
                     before.name, "xyz"[direction], p[0], p[1], p[2]));
   }
   owner_[unknown] = static_cast<std::int32_t>(index);
-  if (!fixed_[unknown] && now.moves)
+  if (now.moves && now.value[direction] != 0)
     moved_.push_back({unknown, now.value[direction], sources_.size() - 1});
   fixed_[unknown] = 1;
 }

@@ -224,6 +224,11 @@ TEST_F(BadInput, OfSupportsIsLocatedAndSaysWhatToDo) {
          {"structure.move.x1 contradicts structure.fix.z0: both prescribe the displacement along x "
           "at (1, ",
           "Leave that direction out"});
+  // what both leave at zero is no contradiction
+  expect(
+      "[structure.fix.y0]\ndirections = [\"y\"]\n[structure.move.z0]\ndisplacement = [1e-3, 0, "
+      "0]\n",
+      {"no error"});
   expect("[structure.fix.z0]\n[structure.move.z1]\n", {"structure.move.z1 says no motion"});
   expect(
       "[structure.fix.z0]\n[structure.move.z1]\nvelocity = [0, 0, 1]\nrecord = \"nothing.txt\"\n",

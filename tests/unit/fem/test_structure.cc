@@ -228,6 +228,16 @@ TEST(Explanation, SaysWhatWillRun) {
                            "surfaces of the mesh: x0, x1", "no density, so no weight",
                            "direct (Cholesky, factored once)", "a window"})
     EXPECT_NE(lines.find(part), std::string::npos) << lines;
+  EXPECT_EQ(lines.find("warning"), std::string::npos) << lines;
+}
+
+TEST(Explanation, WarnsOfAMeshInMillimetres) {
+  const std::string text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [2000, 100], cells = [2, 1] } }\n"
+      "[structure.material]\nyoung = 1e9\npoisson = 0.2\n[structure.fix.x0]\n";
+  const auto lines = explain(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  EXPECT_NE(lines.find("warning: the mesh is 2002 m large. Lengths are metres"), std::string::npos)
+      << lines;
 }
 
 }  // namespace
