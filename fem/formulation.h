@@ -17,6 +17,7 @@ struct Formulation {
   Plane plane = Plane::strain;
   double thickness = 1;  ///< [m] of a structure in 2D
   Locking locking = Locking::untreated;
+  bool large = false;  ///< displacements: stresses are then those of the deformed body
 
   /// λ [Pa] of the strains that the kinematics leave: in plane stress ε_zz follows from σ_zz = 0,
   /// so that λ' = 2 λ μ / (λ + 2 μ).

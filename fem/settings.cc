@@ -149,6 +149,12 @@ Formulation read_formulation(const io::Table& table, int dimension) {
                  "Leave it out.");
     formulation.locking = Formulation::Locking::b_bar;
   }
+  formulation.large = table.choice("displacements", {"small", "large"}, "small") == "large";
+  if (!formulation.large) return formulation;
+  if (formulation.locking == Formulation::Locking::b_bar)
+    table.fail("displacements", "= \"large\" and locking = \"b_bar\" do not go together yet.");
+  if (table.text("analysis", "static") == "dynamic")
+    table.fail("displacements", "= \"large\" is there for analysis = \"static\" alone.");
   return formulation;
 }
 

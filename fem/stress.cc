@@ -36,6 +36,27 @@ Stress::Stress(const Mesh& mesh, Materials materials, const Formulation& formula
   });
 }
 
+namespace {
+
+/// σ = F S Fᵀ / det F of a St. Venant–Kirchhoff solid. @param thin  plane stress: F_zz follows from
+/// S_zz = 0
+StressVector cauchy(const Eigen::Matrix3d& slope, double lambda, double mu, bool thin) {
+  Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + slope;
+  const Eigen::Matrix3d E = 0.5 * (F.transpose() * F - Eigen::Matrix3d::Identity());
+  Eigen::Matrix3d S = lambda * E.trace() * Eigen::Matrix3d::Identity() + 2 * mu * E;
+  if (thin) {
+    S(2, 2) = 0;
+    // The λ' = 2 λ μ / (λ + 2 μ) of plane stress: E_zz = −λ'/(2 μ) tr E.
+    F(2, 2) = std::sqrt(std::max(1e-12, 1 - lambda / mu * E.trace()));
+  }
+  const Eigen::Matrix3d sigma = F * S * F.transpose() / F.determinant();
+  StressVector result;
+  result << sigma(0, 0), sigma(1, 1), sigma(2, 2), sigma(1, 2), sigma(0, 2), sigma(0, 1);
+  return result;
+}
+
+}  // namespace
+
 /// B-bar's volumetric strain at the stress points: the cell's own, projected as in the stiffness.
 template <int d>
 Eigen::VectorXd Stress::projected_divergence(
@@ -74,6 +95,11 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> Stress::stress(std::size_t cell, const 
         inverse_jacobians_.data() + (cell * table.points() + q) * d * d);
     Eigen::Matrix3d slope = Eigen::Matrix3d::Zero();
     slope.topLeftCorner<d, d>() = (moved * table.gradients[q]) * inverse;
+    if (formulation_.large) {
+      result.col(static_cast<int>(q)) =
+          cauchy(slope, lambda, mu, d == 2 && formulation_.plane == Formulation::Plane::stress);
+      continue;
+    }
     const double volumetric =
         b_bar ? (material.lambda() + 2 * mu / 3) * averaged[static_cast<int>(q)] -
                     2 * mu / 3 * slope.trace()

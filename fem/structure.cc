@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "fem/cholesky.h"
+#include "fem/finite_strain.h"
 #include "fem/interface.h"
 #include "fem/model.h"
 #include "fem/modes.h"
@@ -36,13 +37,19 @@ struct Structure::Body {
   BlockMatrix stiffness;
   Stress stress;
   std::optional<Statics> statics;
-  std::optional<MassMatrix> mass;  // of a structure in motion, as the next
+  std::optional<LargeDisplacements> large;  // of a static structure instead
+  std::optional<MassMatrix> mass;           // of a structure in motion, as the next
   std::optional<Dynamics> dynamics;
 
   Body(const Settings& settings, const Vec3& gravity)
       : model(settings, gravity),
         stiffness(assemble_stiffness(model.mesh, model.materials, settings.formulation)),
         stress(model.mesh, model.materials, settings.formulation) {
+    if (settings.formulation.large) {
+      large.emplace(model.mesh, model.materials, model.supports.fixed(), settings.solver,
+                    settings.formulation);
+      return;
+    }
     if (!settings.motion) {
       statics.emplace(model.mesh, stiffness, model.supports.fixed(), settings.solver);
       return;
@@ -118,7 +125,7 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   find_probes();
   if (body_->statics)
     body_->statics->prepare();
-  else
+  else if (body_->dynamics)
     begin_motion();
   seconds_.factor = factor.seconds();
   return surfaces;
@@ -272,6 +279,18 @@ Structure::Response Structure::equilibrate(const protocol::Window& window, const
     prescribed = mesh.zero();
     supports.place(end, prescribed);
   }
+  if (body_->large) {
+    auto& motion = state_.motion;
+    if (motion.displacement.size() > 0)
+      body_->large->restart_from(motion.displacement, motion.force);
+    const auto before = body_->large->iterations();
+    auto solution = body_->large->solve(load, prescribed);
+    worst_residual_ = std::max(worst_residual_, solution.residual);
+    motion.displacement = std::move(solution.displacement);
+    motion.force = load;
+    return {std::move(solution.reaction), total(load, mesh.dimension()),
+            body_->large->iterations() - before};
+  }
   auto solution = body_->statics->solve(load, state_.motion.displacement, prescribed);
   worst_residual_ = std::max(worst_residual_, solution.residual);
   state_.motion.displacement = std::move(solution.displacement);
@@ -368,17 +387,17 @@ void Structure::restore() { state_ = saved_; }
 
 std::vector<std::pair<std::string, double>> Structure::finish() {
   if (!state_.drawn) draw();
-  const auto& solver = body_->statics ? body_->statics->solver() : body_->dynamics->solver();
   std::vector<std::pair<std::string, double>> result{
       {"seconds.setup", seconds_.setup},
       {"seconds.factor", seconds_.factor},
       {"seconds.solve", seconds_.solve},
-      {"dofs", static_cast<double>(body_->model.mesh.unknowns())},
-      {"factor.bytes", solver.factor_bytes}};
-  if (body_->statics)
-    result.emplace_back("residual", worst_residual_);
-  else
+      {"dofs", static_cast<double>(body_->model.mesh.unknowns())}};
+  if (body_->statics) result.emplace_back("factor.bytes", body_->statics->solver().factor_bytes);
+  if (body_->dynamics) result.emplace_back("factor.bytes", body_->dynamics->solver().factor_bytes);
+  if (body_->dynamics)
     result.emplace_back("factorisations", static_cast<double>(body_->dynamics->factorisations()));
+  else
+    result.emplace_back("residual", worst_residual_);
   for (auto& frequency : frequencies()) result.push_back(std::move(frequency));
   return result;
 }
@@ -458,10 +477,11 @@ std::string explain(const Settings& settings) {
   const auto solver = choose_solver(stiffness, mesh, fixed, settings.solver);
   const double mass = mass_of(settings, model);
   std::string text = fmt::format(
-      "{}: {} linear elasticity{}, {} {} of degree {}, {} nodes, {} unknowns ({} held)\n"
+      "{}: {} {} elasticity{}, {} {} of degree {}, {} nodes, {} unknowns ({} held)\n"
       "  surfaces of the mesh: {}\n  {} {:.6g} {}, {}\n",
-      settings.name, settings.motion ? "dynamic" : "static", kinematics_of(settings), mesh.cells(),
-      cells_of(mesh), settings.degree, mesh.nodes(), mesh.unknowns(),
+      settings.name, settings.motion ? "dynamic" : "static",
+      settings.formulation.large ? "geometrically nonlinear" : "linear", kinematics_of(settings),
+      mesh.cells(), cells_of(mesh), settings.degree, mesh.nodes(), mesh.unknowns(),
       std::count(fixed.begin(), fixed.end(), 1), surfaces_of(mesh),
       mesh.dimension() == 2 ? "area" : "volume", mesh.volume(), mesh.dimension() == 2 ? "m2" : "m3",
       mass > 0 ? fmt::format("mass {:.6g} kg", mass) : "no density, so no weight");

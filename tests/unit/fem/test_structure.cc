@@ -132,6 +132,39 @@ TEST_F(AStructure, ReportsPointsAndTheReactionOfEachSupport) {
   EXPECT_NEAR(found.at("reaction.x"), 0, 1e-10 * stress);
 }
 
+// Large displacements: a slender strip under P L²/(E I) = 10 bends to 0.810609 L (Mattiasson 1981),
+// whether in one window or in four, after an iteration that was rejected; small displacements would
+// say 3.33 L.
+TEST_F(AStructure, BendsFarWhenDisplacementsAreLarge) {
+  const std::string text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [1, 0.01], cells = [30, 1] } "
+      "}\ndisplacements = \"large\"\nplane = \"stress\"\n"
+      "[structure.material]\nyoung = 1.2e9\npoisson = "
+      "0\n[structure.fix.x0]\n[structure.load.x1]\nforce = [0, -1000]\nramp = 0.04\n"
+      "[structure.output.point.tip]\nat = [1, 0.005]\n";
+  protocol::Run alone = run();
+  alone.uses.clear();
+  std::vector<double> tips;
+  for (const int windows : {1, 4}) {
+    Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+    structure.start(alone);
+    protocol::Advance last;
+    for (int w = 0; w < windows; ++w) {
+      structure.save();
+      structure.advance({w, w + 1, 0.0, 0.01}, {});
+      structure.restore();
+      const double length = 0.04 / windows;
+      last = structure.advance({w, w + 1, w * length, length}, {});
+    }
+    const auto found = quantities(last);
+    tips.push_back(found.at("tip.displacement.y"));
+    EXPECT_NEAR(tips.back(), -0.810609, 1e-3);
+    EXPECT_NEAR(found.at("reaction.y"), 1000, 1e-5);
+    EXPECT_GT(last.steps, 1u);
+  }
+  EXPECT_NEAR(tips[0], tips[1], 1e-8);
+}
+
 TEST_F(AStructure, RefusesSurfacesAndFieldsItDoesNotHave) {
   auto missing = run();
   missing.uses[0].surface = "inside";
