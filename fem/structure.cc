@@ -488,7 +488,9 @@ std::string explain(const Settings& settings) {
   if (const auto doubt = doubtful_size(mesh); !doubt.empty()) text += "  warning: " + doubt + "\n";
   if (settings.motion) text += fmt::format("  time integration: {}\n", scheme_of(*settings.motion));
   text += fmt::format("  linear solver: {}, because {}\n",
-                      solver.direct ? "direct (Cholesky, factored once)"
+                      solver.direct ? settings.formulation.large
+                                          ? "direct (Cholesky, factored every iteration)"
+                                          : "direct (Cholesky, factored once)"
                                     : "conjugate gradients with algebraic multigrid",
                       solver.why);
   // The direct solver hands CHOLMOD the lower triangle, in a form twice as large; motion adds the
