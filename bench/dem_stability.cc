@@ -5,8 +5,8 @@
 //   dem_stability rest [--quick]      1e6 steps at rest
 //
 // A run is made three times: `unguarded` (ledger kept, nothing refused) to learn what really happens, `ledger` as a user with the ledger
-// runs it, and `plain` as a user without. The latter two look at Engine::step_ratio where the solver does: after the first window and every
-// two hundred steps. A run breaks where the steps make more than a twentieth of the energy that the scene ever held.
+// runs it, and `plain` as a user without. The latter two go by StepWatch, as the solver does, with windows of two hundred
+// steps. A run breaks where the steps make more than a twentieth of the energy that the scene ever held.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "dem/step_watch.h"
 #include "stability_scenes.h"
 
 using namespace acopla::bench;
@@ -62,10 +63,10 @@ Outcome run(Setting s, const std::vector<Body>& bodies, const std::vector<dem::W
   Outcome outcome;
   auto scene = scene_of(s, reach);
   s.ledger = scene.keeps_ledger = s.ledger || dem::watches_energy(scene, step);
-  const auto engine = engine_of(std::move(scene), bodies, walls);
+  const auto engine = engine_of(scene, bodies, walls);
   constexpr std::uint64_t window = 200;
   double start = 0, scale = 0;
-  bool beyond = false;
+  dem::StepWatch watch(scene);
   try {
     if (s.ledger) {
       engine->advance(0, step);
@@ -75,15 +76,9 @@ Outcome run(Setting s, const std::vector<Body>& bodies, const std::vector<dem::W
       const auto some = std::min(window, steps - done);
       engine->advance(some, step);
       done += some;
-      const auto ratio = engine->step_ratio(step);
-      outcome.ratio = std::max(outcome.ratio, ratio.value);
       outcome.overlap = std::max(outcome.overlap, engine->worst_overlap());
-      const bool again = beyond;
-      beyond = ratio.value > 1;
-      if (guard != Guard::none && beyond && again) {
-        outcome.said = fmt::format("step ratio {:.3g} at t = {:.4g} s for particle {}", ratio.value, engine->time(), engine->particles().id[ratio.particle]);
-        break;
-      }
+      watch.look(*engine, step, done);
+      outcome.ratio = std::max(outcome.ratio, watch.ratio());
       if (!s.ledger) continue;
       const auto e = engine->energy();
       if (!std::isfinite(e.stored())) {
@@ -103,7 +98,7 @@ Outcome run(Setting s, const std::vector<Body>& bodies, const std::vector<dem::W
 // What was said, in a word.
 std::string kind_of(const std::string& said) {
   if (said.empty()) return "";
-  for (const auto& [part, word] : {std::pair{"step ratio", "step ratio"}, {"energy drifts", "energy"}, {"in one step", "travel"}, {"left the domain", "domain"},
+  for (const auto& [part, word] : {std::pair{"is unstable", "step ratio"}, {"energy drifts", "energy"}, {"in one step", "travel"}, {"left the domain", "domain"},
                                    {"pushed through", "wall"}, {"coincide", "coincident"}, {"begin with", "overlap"}})
     if (said.find(part) != std::string::npos) return word;
   return "other";

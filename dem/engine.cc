@@ -252,8 +252,8 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
 void Engine::refresh(const SavedPairs* saved) {
   if (!saved && refreshes_ > 0) {
     // Searching costs about as much as computing a fifth of the pairs; each hundredth of a radius adds some pairs in a hundred.
-    if (steps_since_refresh_ < 5) near_skin_ = std::min(1.3 * near_skin_, 0.25 * skin_);
-    else if (steps_since_refresh_ > 20) near_skin_ = std::max(0.8 * near_skin_, 1e-4 * smallest_);
+    if (steps_since_refresh_ < 4) near_skin_ = std::min(1.3 * near_skin_, 0.25 * skin_);
+    else if (steps_since_refresh_ > 12) near_skin_ = std::max(0.8 * near_skin_, 1e-4 * smallest_);
   }
   team_.run(static_cast<unsigned>(partitions_.size()), [&](unsigned p) {
     auto& partition = partitions_[p];
@@ -376,7 +376,7 @@ Vec3 Engine::momentum() const {
 
 Energy Engine::energy() { return ledger_.balance(kinetic_energy(), potential_energy()); }
 
-StepRatio Engine::step_ratio(double step) const {
+StabilityEstimate Engine::stability(double step) const {
   StabilityEstimate estimate(particles_, step);
   for_each_pair([&](std::uint32_t i, std::uint32_t j, double overlap) {
     estimate.add_pair(i, j, overlap, kernels_.of(particles_.material[i], particles_.material[j]));
@@ -384,7 +384,7 @@ StepRatio Engine::step_ratio(double step) const {
   for (const auto& partition : partitions_)
     partition.walls.for_each_contact([&](std::uint32_t i, std::uint8_t material, std::uint8_t wall, double overlap, const Vec3& normal,
                                          double curvature) { estimate.add_wall(i, overlap, normal, curvature, kernels_.of(material, wall)); });
-  return estimate.ratio();
+  return estimate;
 }
 
 void Engine::check_domain() const {

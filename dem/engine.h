@@ -50,7 +50,9 @@ class Engine {
   /// Contacts at the last step, particle–particle and particle–wall.
   std::size_t contact_count() const;
   /// Δt over the stability limit of the contacts there are (StabilityEstimate::ratio), and who decides it.
-  StepRatio step_ratio(double step) const;
+  StepRatio step_ratio(double step) const { return stability(step).ratio(); }
+  /// The same in parts: a bound that costs some steps, a limit that costs hundreds in a large bed.
+  StabilityEstimate stability(double step) const;
   /// Deepest overlap over the smaller radius.
   double worst_overlap() const;
   std::uint64_t rebuilds() const { return rebuilds_; }

@@ -17,11 +17,11 @@ struct alignas(8 * lanes) HistoryLane {
   double value[lanes];
 };
 
-/// Pairs of particles that touch or nearly touch, of one pair of materials, in ascending order of (i, j) with i < j. The arrays are
-/// padded to whole packs; spare lanes repeat the last pair and are thrown away.
+/// Pairs of particles that touch or nearly touch, of one pair of materials, i < j, and some that did. The arrays are padded to whole
+/// packs; spare lanes repeat the last pair and are thrown away.
 struct PairContacts {
   std::vector<std::uint32_t> i, j;
-  std::vector<std::uint32_t> slot;      ///< place in the list of neighbours; ascending
+  std::vector<std::uint32_t> slot;      ///< place in the list of neighbours
   std::vector<HistoryLane> history;     ///< [pack · history_size + number]
   std::size_t size = 0;                 ///< pairs, without spare lanes
   /// Where j is another thread's particle: the force on it goes to exports[first_export + pair], not to the particle.

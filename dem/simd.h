@@ -85,6 +85,19 @@ inline double sum(const DoublePack& a) {
   return total;
 }
 
+/// A bit a lane.
+inline unsigned bits(const MaskPack& mask) {
+#if defined(__AVX512F__)
+  return _mm512_cmplt_epi64_mask(static_cast<__m512i>(mask.v), _mm512_setzero_si512());
+#elif defined(__AVX__)
+  return static_cast<unsigned>(_mm256_movemask_pd(_mm256_castsi256_pd(static_cast<__m256i>(mask.v))));
+#else
+  unsigned all = 0;
+  for (std::size_t lane = 0; lane < lanes; ++lane) all |= static_cast<unsigned>(mask.v[lane] != 0) << lane;
+  return all;
+#endif
+}
+
 /// 1 in the first `count` lanes, 0 in the others.
 inline DoublePack first_lanes(std::size_t count) {
   DoublePack ones;
@@ -160,6 +173,10 @@ inline void put(Record& record, const Halves& row) {
   halves(record)[0] = row.low;
   halves(record)[1] = row.high;
 }
+inline Halves operator-(const Halves& row) { return {-row.low, -row.high}; }
+inline Halves operator+(const Halves& a, const Halves& b) { return {a.low + b.low, a.high + b.high}; }
+inline Halves operator-(const Halves& a, const Halves& b) { return {a.low - b.low, a.high - b.high}; }
+inline Halves operator*(const Halves& row, double factor) { return {row.low * factor, row.high * factor}; }
 #endif
 inline void add(Record& record, const RecordVector& row) { as_vector(record) += row; }
 inline void put(Record& record, const RecordVector& row) { as_vector(record) = row; }

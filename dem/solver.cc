@@ -15,7 +15,7 @@
 namespace acopla::dem {
 
 Solver::Solver(const io::Table& root, const std::string& name)
-    : scene_(read_scene(root, name)), largest_step_(dem::largest_step(scene_, root.table(name))) {
+    : scene_(read_scene(root, name)), largest_step_(dem::largest_step(scene_, root.table(name))), step_watch_(scene_) {
   // A scene at the default step does not pay for this.
   if (watches_energy(scene_, largest_step_)) scene_.keeps_ledger = true;
 }
@@ -131,7 +131,7 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
   steps_ += steps;
   last_step_ = step;
   couples_lost_ = std::max(couples_lost_, load_.couples_lost);
-  check_step(step);
+  step_watch_.look(*engine_, step, steps_);
 
   protocol::Advance result;
   result.steps = steps;
@@ -174,23 +174,6 @@ void Solver::step_through(std::uint64_t steps, double step) {
   load_ = std::move(sum);
 }
 
-// The bound of the stable step takes as long as some steps: it is looked at in the first window and then every two hundred steps.
-void Solver::check_step(double step) {
-  if (checked_at_ > 0 && steps_ < checked_at_ + 200) return;
-  checked_at_ = steps_;
-  const auto ratio = engine_->step_ratio(step);
-  step_ratio_ = ratio.value;
-  // A hard impact may pass the limit for some steps, in which nothing can grow; who is still beyond it two hundred steps later stays there.
-  const bool again = beyond_limit_;
-  beyond_limit_ = ratio.value > 1;
-  if (!beyond_limit_ || !again || scene_.allow_unstable_step) return;
-  const Vec3 x = engine_->particles().position[ratio.particle].vector();
-  throw std::runtime_error(fmt::format(
-      "the step of {:.4g} s is unstable at t = {:.6g} s: it is {:.2f} of the limit of the contacts there are now, of which those of particle {} at "
-      "({:.4g}, {:.4g}, {:.4g}) m are the stiffest. Lower {}, or say allow_unstable_step = true.",
-      step, engine_->time(), ratio.value, engine_->particles().id[ratio.particle], x[0], x[1], x[2], scene_.step ? "step" : "step_fraction"));
-}
-
 std::vector<std::pair<std::string, double>> Solver::quantities(double) {
   std::vector<std::pair<std::string, double>> values;
   for (std::size_t w = 0; w < scene_.walls.size(); ++w) {
@@ -204,7 +187,7 @@ std::vector<std::pair<std::string, double>> Solver::quantities(double) {
   values.emplace_back("kinetic_energy", engine_->kinetic_energy());
   values.emplace_back("particles", static_cast<double>(engine_->particles().size()));
   values.emplace_back("contacts", static_cast<double>(engine_->contact_count()));
-  values.emplace_back("step_ratio", step_ratio_);
+  values.emplace_back("step_ratio", step_watch_.ratio());
   values.emplace_back("overlap.max", engine_->worst_overlap());
   traffic_->quantities(values);
   if (engine_->keeps_ledger()) {
@@ -223,7 +206,7 @@ void Solver::save() {
   writer("engine", *engine_);
   writer("traffic", *traffic_);
   writer("steps", steps_);
-  writer("checked_at", checked_at_);
+  writer("step_watch", step_watch_);
   saved_next_picture_ = next_picture_;
 }
 
@@ -233,7 +216,7 @@ void Solver::restore() {
   reader("engine", *engine_);
   reader("traffic", *traffic_);
   reader("steps", steps_);
-  reader("checked_at", checked_at_);
+  reader("step_watch", step_watch_);
   reader.finish();
   next_picture_ = saved_next_picture_;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dem/engine.h"
+#include "dem/step_watch.h"
 #include "dem/traffic.h"
 #include "io/archive.h"
 #include "io/vtk.h"
@@ -39,7 +40,6 @@ class Solver final : public protocol::Participant {
   Particles settled_between_standing_walls(Particles particles) const;
   void prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received);
   void step_through(std::uint64_t steps, double step);
-  void check_step(double step);
   std::vector<std::pair<std::string, double>> quantities(double step);
   void write_output(const protocol::Window& window);
   void write_particles(double time);
@@ -47,6 +47,7 @@ class Solver final : public protocol::Participant {
 
   Scene scene_;
   double largest_step_;
+  StepWatch step_watch_;
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<Traffic> traffic_;
   std::vector<std::size_t> sent_, received_;  // walls the coupling uses
@@ -57,9 +58,7 @@ class Solver final : public protocol::Participant {
   std::unique_ptr<io::PvdSeries> pictures_;
   std::vector<std::pair<std::size_t, io::PvdSeries>> wall_pictures_;  // of walls that move and have vertices
   double next_picture_ = 0;
-  std::uint64_t steps_ = 0, checked_at_ = 0;
-  double step_ratio_ = 0;
-  bool beyond_limit_ = false;  // at the last look
+  std::uint64_t steps_ = 0;
   std::size_t couples_lost_ = 0, triangles_dropped_ = 0;
   double seconds_ = 0;
   double last_step_ = 0, last_rate_ = 0;

@@ -17,7 +17,7 @@ double ratio_of(double a, double b, double c) {
 }  // namespace
 
 StabilityEstimate::StabilityEstimate(const Particles& particles, double step)
-    : particles_(particles), step_(step), place_(particles.size(), ~0u) {}
+    : particles_(particles), step_(step), crude_(particles.size(), 0.0) {}
 
 void StabilityEstimate::add_pair(std::uint32_t i, std::uint32_t j, double overlap, const Kernel& kernel) {
   const double r_i = particles_.radius_of(i), r_j = particles_.radius_of(j), m_i = particles_.mass_of(i), m_j = particles_.mass_of(j);
@@ -41,17 +41,21 @@ void StabilityEstimate::add(Contact contact, const ContactStiffness& rates, doub
   contact.twisting = {rates.twisting * contact.rolling.stiffness, rates.twisting * contact.rolling.dashpot, fixed};
   contacts_.push_back(contact);
   const bool pair = contact.j != none;
-  add_to(contact.i, contact.normal, contact.arm_i, contact, pair ? 2 : 1);
-  if (pair) add_to(contact.j, -contact.normal, contact.arm_j, contact, 2);
+  // A contact closes, or it slips and rolls: these motions are perpendicular.
+  const Rates all{1, 1, 1};
+  const double closing = contact.closing.at(all), shear = contact.shear.at(all), turning = std::max(contact.rolling.at(all), contact.twisting.at(all));
+  const auto count = [&](std::uint32_t i, double arm, double bodies) {
+    const double mass = particles_.mass_of(i), inertia = particles_.inertia_of(i);
+    crude_[i] += bodies * std::max(closing / mass, shear / mass + (shear * arm * arm + turning) / inertia);
+  };
+  count(contact.i, contact.arm_i, pair ? 2 : 1);
+  if (pair) count(contact.j, contact.arm_j, 2);
 }
 
-void StabilityEstimate::add_to(std::uint32_t i, const Vec3& normal, double arm, const Contact& contact, double bodies) {
-  if (place_[i] == ~0u) {
-    place_[i] = static_cast<std::uint32_t>(sums_.size());
-    sums_.emplace_back();
-    particle_.push_back(i);
-  }
-  auto& sums = sums_[place_[i]];
+void StabilityEstimate::add_to(Sums& sums, std::uint32_t i, const Contact& contact) const {
+  const bool first = contact.i == i;
+  const Vec3 normal = first ? contact.normal : Vec3(-contact.normal);
+  const double arm = first ? contact.arm_i : contact.arm_j, bodies = contact.j != none ? 2 : 1;
   // In coordinates scaled by the roots of mass and inertia. Slip of i's surface: u − n (n·u) − arm θ × n.
   const double per_mass = std::sqrt(bodies / particles_.mass_of(i)), per_inertia = std::sqrt(bodies / particles_.inertia_of(i));
   const bool plane = particles_.kind.dimension == 2;
@@ -83,21 +87,38 @@ void StabilityEstimate::add_to(std::uint32_t i, const Vec3& normal, double arm, 
 }
 
 StepRatio StabilityEstimate::bound() const {
-  // The Frobenius norm bounds the largest eigenvalue: eigenvalues are needed only while a norm exceeds the largest found.
-  std::vector<double> norm(sums_.size());
-  std::vector<std::uint32_t> order(sums_.size());
+  // The contacts of every particle.
+  std::vector<std::uint32_t> start(particles_.size() + 1, 0);
+  const auto visit = [&](auto&& action) {
+    for (std::uint32_t c = 0; c < contacts_.size(); ++c) {
+      action(contacts_[c].i, c);
+      if (contacts_[c].j != none) action(contacts_[c].j, c);
+    }
+  };
+  visit([&](std::uint32_t i, std::uint32_t) { ++start[i + 1]; });
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<std::uint32_t> of(start.back()), next(start.begin(), start.end() - 1);
+  visit([&](std::uint32_t i, std::uint32_t c) { of[next[i]++] = c; });
+  // The crude bound adds up the contacts' eigenvalues, the Frobenius norm is nearer: eigenvalues are needed only while either exceeds the
+  // largest found.
+  std::vector<std::uint32_t> order(particles_.size());
   std::iota(order.begin(), order.end(), 0u);
-  for (std::size_t k = 0; k < sums_.size(); ++k) norm[k] = sums_[k].all().norm();
-  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return norm[a] > norm[b]; });
+  const auto less = [&](std::uint32_t a, std::uint32_t b) { return crude_[a] < crude_[b] || (crude_[a] == crude_[b] && a > b); };
+  std::make_heap(order.begin(), order.end(), less);
   double largest = 0;
   StepRatio worst;
-  for (const auto k : order) {
-    if (norm[k] <= largest) break;
-    const Eigen::SelfAdjointEigenSolver<Block> solver(sums_[k].all());
+  for (auto end = order.end(); end != order.begin() && crude_[order.front()] > largest; --end) {
+    std::pop_heap(order.begin(), end, less);
+    const auto i = *(end - 1);
+    Sums sums;
+    for (auto k = start[i]; k < start[i + 1]; ++k) add_to(sums, i, contacts_[of[k]]);
+    const Block all = sums.all();
+    if (all.norm() <= largest) continue;
+    const Eigen::SelfAdjointEigenSolver<Block> solver(all);
     if (solver.eigenvalues()[5] <= largest) continue;
     largest = solver.eigenvalues()[5];
     const Eigen::Matrix<double, 6, 1> mode = solver.eigenvectors().col(5);
-    worst = {ratio_of(mode.dot(sums_[k].stiffness * mode), mode.dot(sums_[k].dashpot * mode), mode.dot(sums_[k].fixed * mode)), particle_[k]};
+    worst = {ratio_of(mode.dot(sums.stiffness * mode), mode.dot(sums.dashpot * mode), mode.dot(sums.fixed * mode)), i};
   }
   return worst;
 }
@@ -105,10 +126,14 @@ StepRatio StabilityEstimate::bound() const {
 // result = M^-½ (weighted sum of Δt² K, 2 Δt (2 C_n + C_t) and its fixed part) M^-½ motion
 void StabilityEstimate::apply(const Motion& motion, Motion& result, const Rates& weights) const {
   result.setZero();
+  // Of every particle 1/sqrt(mass) and 1/sqrt(inertia).
+  if (roots_.empty())
+    for (std::size_t i = 0; i < particles_.size(); ++i)
+      roots_.push_back({1 / std::sqrt(particles_.mass_of(i)), 1 / std::sqrt(particles_.inertia_of(i))});
   const bool plane = particles_.kind.dimension == 2;
   for (const auto& c : contacts_) {
-    const auto velocity = [&](std::uint32_t i) { return Vec3(motion.col(i).head<3>() / std::sqrt(particles_.mass_of(i))); };
-    const auto spin = [&](std::uint32_t i) { return Vec3(motion.col(i).tail<3>() / std::sqrt(particles_.inertia_of(i))); };
+    const auto velocity = [&](std::uint32_t i) { return Vec3(roots_[i].mass * motion.col(i).head<3>()); };
+    const auto spin = [&](std::uint32_t i) { return Vec3(roots_[i].inertia * motion.col(i).tail<3>()); };
     Vec3 relative = velocity(c.i), turn = spin(c.i), arms = c.arm_i * spin(c.i);
     if (c.j != none) {
       relative -= velocity(c.j);
@@ -121,8 +146,8 @@ void StabilityEstimate::apply(const Motion& motion, Motion& result, const Rates&
     const Vec3 rolling = c.rolling.at(weights) * (turn - twist * c.normal) + c.twisting.at(weights) * twist * c.normal;
     const Vec3 turning = -c.normal.cross(shear);
     const auto add = [&](std::uint32_t i, const Vec3& on, const Vec3& torque) {
-      result.col(i).head<3>() += on / std::sqrt(particles_.mass_of(i));
-      result.col(i).tail<3>() += torque / std::sqrt(particles_.inertia_of(i));
+      result.col(i).head<3>() += roots_[i].mass * on;
+      result.col(i).tail<3>() += roots_[i].inertia * torque;
     };
     add(c.i, force, c.arm_i * turning + rolling);
     if (c.j != none) add(c.j, -force, c.arm_j * turning - rolling);

@@ -56,14 +56,16 @@ class StabilityEstimate {
     Block all() const { return stiffness + dashpot + fixed; }
   };
   void add(Contact contact, const ContactStiffness& rates, double reduced_inertia);
-  void add_to(std::uint32_t i, const Vec3& normal, double arm, const Contact& contact, double bodies);
+  void add_to(Sums& sums, std::uint32_t i, const Contact& contact) const;
   void apply(const Motion& motion, Motion& result, const Rates& weights) const;
   const Particles& particles_;
   double step_;
-  std::vector<std::uint32_t> place_;  // in sums_, of a particle with contacts
-  std::vector<Sums> sums_;
-  std::vector<std::uint32_t> particle_;
+  std::vector<double> crude_;  // of every particle, a bound of its largest eigenvalue
   std::vector<Contact> contacts_;
+  struct Roots {
+    double mass, inertia;
+  };
+  mutable std::vector<Roots> roots_;  // filled when first needed
 };
 
 }  // namespace acopla::dem

@@ -82,11 +82,19 @@ CriticalStep critical_step(const Scene& scene) {
     const double radius = scene.smallest_radius(of);
     if (!(radius > 0)) continue;
     const auto particles = fmt::format("{} {} of {:.4g} m", material.name, scene.dimension == 2 ? "discs" : "spheres", 2 * radius);
-    if (material.shear_modulus > 0)
-      consider(M_PI * radius * std::sqrt(material.density / material.shear_modulus) / (0.1631 * material.poisson + 0.8766),
-               "Rayleigh time of " + particles);
     bool hertz = false;
-    for (std::size_t other = 0; other < scene.materials.size(); ++other) hertz = hertz || scene.pair(of, other).laws.normal == Hertz::name;
+    // An impact with a strong dashpot needs shorter steps than the Rayleigh time says: with these a fifth of it keeps e within 0.0125.
+    double room = 1;
+    for (std::size_t other = 0; other < scene.materials.size(); ++other) {
+      const auto& pair = scene.pair(of, other);
+      if (pair.laws.normal != Hertz::name) continue;
+      hertz = true;
+      const double zeta = pair.hertz_damping / 2;
+      room = std::min(room, 1.5 * (std::sqrt(1 + 4 * zeta * zeta) - 2 * zeta));
+    }
+    if (material.shear_modulus > 0)
+      consider(room * M_PI * radius * std::sqrt(material.density / material.shear_modulus) / (0.1631 * material.poisson + 0.8766),
+               fmt::format("Rayleigh time of {}{}", particles, room < 1 ? ", shortened for the dashpots" : ""));
     if (hertz) consider(5 * limit_in_packing(scene, of, 0.01), "five times the limit of " + particles + " squeezed by 1 % of their radius");
     else consider(limit_in_packing(scene, of, 0.05), "springs and dashpots of a dense packing of " + particles);
   }

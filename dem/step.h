@@ -14,9 +14,9 @@ struct CriticalStep {
 
 /// The critical step of a scene before it runs. With springs whose stiffness does not depend on the overlap it is the stability limit of
 /// leapfrog (dem/stability.h) in a dense packing of the smallest particles in a corner of the walls, all springs and dashpots of their laws
-/// together. With Hertz it is the Rayleigh time of the particles' materials, T_R = π r sqrt(ρ/G) / (0.1631 ν + 0.8766), of which one takes
-/// a fifth, or less where a fifth would not be stable in such a packing squeezed to an overlap of 1 % of the radius. While the scene runs,
-/// Engine::step_ratio() tells the limit of the contacts there are.
+/// together. With Hertz it is the Rayleigh time of the particles' materials, T_R = π r sqrt(ρ/G) / (0.1631 ν + 0.8766), less for strong
+/// dashpots, of which one takes a fifth, or less where a fifth would not be stable in such a packing squeezed to an overlap of 1 % of the
+/// radius. While the scene runs, Engine::step_ratio() tells the limit of the contacts there are.
 CriticalStep critical_step(const Scene& scene);
 
 /// Whether a run keeps the energy ledger without being asked. From half the critical step on an impact may make energy while all contacts that

@@ -1,6 +1,7 @@
 #include "dem/touching_pairs.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace acopla::dem {
 
@@ -48,15 +49,7 @@ const double* SavedPairs::find(std::uint32_t i, std::uint32_t j) const {
 
 namespace {
 
-// Room for `more` pairs and the padding of the last pack.
-void reserve(PairContacts& group, std::size_t more) {
-  const auto needed = group.size + more + lanes;
-  if (group.i.size() >= needed) return;
-  const auto room = std::max(needed, group.i.size() * 3 / 2);
-  group.i.resize(room);
-  group.j.resize(room);
-  group.slot.resize(room);
-}
+std::size_t packs(const PairContacts& group) { return (group.size + lanes - 1) / lanes; }
 
 void pad(PairContacts& group) {
   if (group.size == 0) return;
@@ -66,87 +59,133 @@ void pad(PairContacts& group) {
   }
 }
 
-std::size_t packs(const PairContacts& group) { return (group.size + lanes - 1) / lanes; }
-
-void copy_history(const PairContacts& from, std::size_t a, PairContacts& to, std::size_t b, std::size_t numbers) {
-  const auto* source = &from.history[a / lanes * numbers];
-  auto* target = &to.history[b / lanes * numbers];
-  for (std::size_t n = 0; n < numbers; ++n) target[n].value[b % lanes] = source[n].value[a % lanes];
-}
-
 }  // namespace
+
+// Within a block of rows every row's first neighbour comes first, then every row's second: pairs that follow each other have other members, so
+// that adding their forces is no chain of additions to the same place.
+void TouchingPairs::list(const PairList& rows, std::uint32_t first, std::uint32_t last) {
+  constexpr std::uint32_t block = 32;
+  listed_.clear();
+  listed_.reserve(rows.second.size());
+  std::vector<Listed> others;
+  for (std::uint32_t from = first; from < last; from += block) {
+    const auto to = std::min(from + block, last);
+    bool more = true;
+    for (std::uint32_t k = 0; more; ++k) {
+      more = false;
+      for (auto i = from; i < to; ++i) {
+        const auto slot = rows.start[i - first] + k;
+        if (slot >= rows.start[i - first + 1]) continue;
+        more = true;
+        const auto j = rows.second[slot];
+        (j < last ? listed_ : others).push_back({i, j});
+      }
+    }
+  }
+  own_count_ = static_cast<std::uint32_t>(listed_.size());
+  listed_.insert(listed_.end(), others.begin(), others.end());
+}
 
 void TouchingPairs::refresh(const Particles& particles, const PairList& rows, std::uint32_t first, std::uint32_t last, double skin,
                             const KernelTable& kernels, bool one_material, const SavedPairs* saved) {
-  groups_.resize(2 * kernels.kernel.size());
-  groups_.swap(earlier_);
-  groups_.resize(2 * kernels.kernel.size());
-  for (auto& group : groups_) group.size = 0;
+  if (saved) {
+    list(rows, first, last);
+    groups_.resize(2 * kernels.kernel.size());
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      groups_[g].size = 0;
+      groups_[g].exports = g % 2 == 1;
+    }
+    free_.assign(groups_.size(), {});
+    place_.assign(listed_.size(), nowhere);
+    near_.assign((listed_.size() + lanes - 1) / lanes, 0);
+  }
   const Record* const position = particles.position.data();
-  const std::uint32_t* const second = rows.second.data();
-  const auto append = [](PairContacts& group, std::uint32_t i, std::uint32_t j, std::uint32_t slot, bool touches) {
-    // Written in any case and counted only where it touches: no branch to mispredict.
-    group.i[group.size] = i;
-    group.j[group.size] = j;
-    group.slot[group.size] = slot;
-    group.size += touches;
+  const auto only = one_material && first < last ? 2u * kernels.group[particles.material[first] * (kernels.materials + 1)] : 0;
+  const auto group_of = [&](std::uint32_t slot) {
+    const auto [i, j] = listed_[slot];
+    const auto own = one_material ? only : 2u * kernels.group[particles.material[i] * kernels.materials + particles.material[j]];
+    return own + (slot >= own_count_);
   };
-  const std::size_t only = one_material && first < last ? 2u * kernels.group[particles.material[first] * (kernels.materials + 1)] : 0;
-  for (std::uint32_t i = first; i < last; ++i) {
-    const Record a = position[i];
-    const double wide = a.w + skin;
-    const auto begin = rows.start[i - first], end = rows.start[i - first + 1];
-    const auto touches = [&](std::uint32_t j) {
-      const Record& b = position[j];
-      const double dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z, reach = wide + b.w;
-      return dx * dx + dy * dy + dz * dz < reach * reach;
-    };
-    // Rows are ascending: the pairs of this partition come first.
-    auto k = begin;
-    if (one_material) {
-      auto &own = groups_[only], &other = groups_[only + 1];
-      reserve(own, end - begin);
-      for (; k < end && second[k] < last; ++k) append(own, i, second[k], k, touches(second[k]));
-      reserve(other, end - k);
-      for (; k < end; ++k) append(other, i, second[k], k, touches(second[k]));
-    } else {
-      const auto* const row = &kernels.group[particles.material[i] * kernels.materials];
-      for (; k < end; ++k) {
-        const auto j = second[k];
-        auto& group = groups_[2u * row[particles.material[j]] + (j >= last)];
-        reserve(group, 1);
-        append(group, i, j, k, touches(j));
-      }
+  const auto count = listed_.size();
+  std::uint32_t i[lanes], j[lanes];
+  for (std::size_t c = 0; c < near_.size(); ++c) {
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const auto& pair = listed_[std::min(c * lanes + lane, count - 1)];
+      i[lane] = pair.i;
+      j[lane] = pair.j;
+    }
+    const RecordPack a = gathered(position, i), b = gathered(position, j);
+    const DoublePack dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z, reach = a.w + b.w + skin;
+    auto near = bits(dx * dx + dy * dy + dz * dz < reach * reach);
+    if ((c + 1) * lanes > count) near &= (1u << (count - c * lanes)) - 1;
+    // Few pairs come or go: the others, and their histories, stay where they are.
+    auto changed = near ^ near_[c];
+    near_[c] = static_cast<std::uint8_t>(near);
+    while (changed) {
+      const auto lane = static_cast<unsigned>(std::countr_zero(changed));
+      changed &= changed - 1;
+      const auto slot = static_cast<std::uint32_t>(c * lanes + lane);
+      const auto group = group_of(slot);
+      if (near >> lane & 1) enter(slot, group, kernels);
+      else free_[group].push_back(place_[slot]);
     }
   }
   export_count_ = 0;
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
-    auto& group = groups_[g];
+  for (auto& group : groups_) {
     pad(group);
-    group.exports = g % 2 == 1;
-    if (group.exports) {
-      group.first_export = export_count_;
-      export_count_ += group.size;
-    }
-    const auto* kernel = kernels.kernel[g / 2].get();
-    const auto numbers = kernel ? kernel->history_size() : 0;
-    group.history.assign(packs(group) * numbers, HistoryLane{});
-    if (numbers == 0) continue;
-    if (saved) {
-      for (std::size_t c = 0; c < group.size; ++c)
-        if (const double* values = saved->find(group.i[c], group.j[c]))
-          for (std::size_t n = 0; n < numbers; ++n) group.history[c / lanes * numbers + n].value[c % lanes] = values[n];
-    } else {
-      const auto& earlier = earlier_[g];
-      std::size_t e = 0;
-      for (std::size_t c = 0; c < group.size; ++c) {
-        while (e < earlier.size && earlier.slot[e] < group.slot[c]) ++e;
-        if (e < earlier.size && earlier.slot[e] == group.slot[c]) copy_history(earlier, e, group, c, numbers);
-      }
-    }
+    if (!group.exports) continue;
+    group.first_export = export_count_;
+    export_count_ += group.size;
   }
+  if (saved) restore(*saved, kernels);
   exports.force.resize(export_count_);
   if (particles.has_spins()) exports.torque.resize(export_count_);
+}
+
+// A pair that left keeps its place until another needs it: it does not touch, and nobody else is there. When it comes back it finds it again.
+void TouchingPairs::enter(std::uint32_t slot, std::size_t of, const KernelTable& kernels) {
+  auto& group = groups_[of];
+  auto& free = free_[of];
+  if (place_[slot] != nowhere) return;
+  auto place = static_cast<std::uint32_t>(group.size);
+  while (!free.empty()) {
+    const auto left = free.back();
+    free.pop_back();
+    const auto owner = group.slot[left];
+    if (near_[owner / lanes] >> (owner % lanes) & 1) continue;  // it came back, or another took the place
+    place_[owner] = nowhere;
+    place = left;
+    break;
+  }
+  const auto* const kernel = kernels.kernel[of / 2].get();
+  const auto numbers = kernel ? kernel->history_size() : 0;
+  if (place == group.size) {
+    ++group.size;
+    if (const auto room = packs(group) * lanes; group.i.size() < room) {
+      group.i.resize(std::max(room, group.i.size() * 3 / 2));
+      group.j.resize(group.i.size());
+      group.slot.resize(group.i.size());
+    }
+    group.history.resize(packs(group) * numbers);
+  }
+  group.i[place] = listed_[slot].i;
+  group.j[place] = listed_[slot].j;
+  group.slot[place] = slot;
+  place_[slot] = place;
+  for (std::size_t n = 0; n < numbers; ++n) group.history[place / lanes * numbers + n].value[place % lanes] = 0;
+}
+
+void TouchingPairs::restore(const SavedPairs& saved, const KernelTable& kernels) {
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    auto& group = groups_[g];
+    const auto* const kernel = kernels.kernel[g / 2].get();
+    const auto numbers = kernel ? kernel->history_size() : 0;
+    group.history.resize(packs(group) * numbers);  // after a longer list
+    if (numbers == 0) continue;
+    for (std::size_t c = 0; c < group.size; ++c)
+      if (const double* values = saved.find(group.i[c], group.j[c]))
+        for (std::size_t n = 0; n < numbers; ++n) group.history[c / lanes * numbers + n].value[c % lanes] = values[n];
+  }
 }
 
 void TouchingPairs::save(SavedPairs& saved, const KernelTable& kernels) const {
@@ -172,7 +211,7 @@ std::size_t TouchingPairs::size() const {
 }
 
 std::size_t TouchingPairs::bytes() const {
-  std::size_t bytes = 0;
+  std::size_t bytes = listed_.size() * (sizeof(Listed) + sizeof(std::uint32_t)) + near_.size();
   for (const auto& group : groups_) bytes += group.size * 3 * sizeof(std::uint32_t) + group.history.size() * sizeof(HistoryLane);
   return bytes;
 }

@@ -66,14 +66,31 @@ class TouchingPairs {
   template <class Archive>
   void state(Archive& archive) {
     archive("groups", groups_);
+    archive("listed", listed_);
+    archive("own_count", own_count_);
+    archive("place", place_);
+    archive("near", near_);
+    archive("free", free_);
     archive("export_count", export_count_);
     exports.force.resize(export_count_);
     exports.torque.resize(export_count_);
   }
 
  private:
+  struct Listed {
+    std::uint32_t i, j;
+  };
+  void list(const PairList& rows, std::uint32_t first, std::uint32_t last);
+  std::vector<Listed> listed_;  // the neighbours in the order in which they are looked at: own pairs, then those that export
+  std::uint32_t own_count_ = 0;
+  static constexpr std::uint32_t nowhere = ~0u;
+  void enter(std::uint32_t slot, std::size_t of, const KernelTable& kernels);
+  void restore(const SavedPairs& saved, const KernelTable& kernels);
+  std::vector<std::uint32_t> place_;             // in its group, of everybody listed; nowhere: it was not near yet, or lost its place
+  std::vector<std::uint8_t> near_;               // who listed is near, a bit each
+  std::vector<std::vector<std::uint32_t>> free_; // places of a group whose pairs are not near any more; may be out of date
   // Of group g: its own pairs at 2 g, those that export at 2 g + 1.
-  std::vector<PairContacts> groups_, earlier_;
+  std::vector<PairContacts> groups_;
   std::size_t export_count_ = 0;
 };
 

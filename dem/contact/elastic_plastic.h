@@ -74,7 +74,7 @@ struct ElasticPlastic {
       turn = turn - twist * k.normal;
     }
     const auto before = turned_with_frame(history.torque, k);
-    const auto yields = slides_at(shear.softening * before - increment * turn, limit, history.torque);
+    const auto yields = slides_at(turned_with_frame(history.torque, k, shear.softening) - increment * turn, limit, history.torque);
     const typename K::Turn damping = select(yields, Real(0), dash) * turn;
     energy = select(spring > Real(0), dot(history.torque, history.torque) / (2.0 * spring), Real(0));
     work = k.step * dot(damping - Real(0.5) * (before + history.torque), turn);

@@ -43,17 +43,18 @@ struct Kinematics {
 /// the normal and tilts with the normal. Both small rotations are taken to first order and the length is then restored by
 /// one step of Newton's root, to fourth order in the step's angle. A vector that lay out of the plane by more than 45° is
 /// not stretched back to its length: it is round-off, and would grow with every step. In the plane the tangent turns by itself.
+/// @param share  how much of it is kept, e.g. where a spring softens
 template <class K>
-typename K::Turn turned_with_frame(const typename K::Turn& before, const K& k) {
+typename K::Turn turned_with_frame(const typename K::Turn& before, const K& k, const typename K::Real& share = typename K::Real(1)) {
   using Real = typename K::Real;
-  if constexpr (K::dimension == 2) return before;
+  if constexpr (K::dimension == 2) return share * before;
   else {
     using std::min;
     const Real length = dot(before, before);
     typename K::Turn after = before + (k.step * dot(k.mean_spin, k.normal)) * cross(k.normal, before);
     after = after - dot(after, k.normal) * k.normal;
     const Real kept = dot(after, after);
-    return select(kept > Real(0), 0.5 * (1.0 + min(length / kept, Real(2))), Real(0)) * after;
+    return (share * select(kept > Real(0), 0.5 * (1.0 + min(length / kept, Real(2))), Real(0))) * after;
   }
 }
 

@@ -59,7 +59,7 @@ struct Mindlin {
     const auto now = spring(stiffness<Normal>(k, p, normal), history);
     before = turned_with_frame(history.force, k);
     history.stiffness = now.stiffness;
-    return held_by_friction(now.softening * before - (k.step * now.increment) * k.slip, p.friction * normal_force,
+    return held_by_friction(turned_with_frame(history.force, k, now.softening) - (k.step * now.increment) * k.slip, p.friction * normal_force,
                             dashpot<Normal>(k, p, normal), k.slip, history.force);
   }
 };

@@ -105,8 +105,9 @@ class KernelOf final : public Kernel {
   }
 
   // Normal and tangential force as one vector on i.
-  static Vector<DoublePack, dimension> force_of(const typename Model::template Response<Pack>& r, const Vector<DoublePack, dimension>& n) {
-    Vector<DoublePack, dimension> force = r.normal * n;
+  template <class R, class Real>
+  static Vector<Real, dimension> force_of(const R& r, const Vector<Real, dimension>& n) {
+    Vector<Real, dimension> force = r.normal * n;
     if constexpr (Model::has_friction) {
       if constexpr (dimension == 2) force = {force.x - r.shear.x * n.y, force.y + r.shear.x * n.x};
       else force = force + r.shear;
@@ -114,8 +115,9 @@ class KernelOf final : public Kernel {
     return force;
   }
   // n × force: the torque of a unit arm along the normal.
-  static Turn turning_of(const typename Model::template Response<Pack>& r, const Vector<DoublePack, dimension>& n) {
-    if constexpr (!Model::has_friction) return zero_vector<DoublePack, Pack::turns>();
+  template <class R, class Real>
+  static Vector<Real, Pack::turns> turning_of(const R& r, const Vector<Real, dimension>& n) {
+    if constexpr (!Model::has_friction) return zero_vector<Real, Pack::turns>();
     else if constexpr (dimension == 2) return r.shear;
     else return cross(n, r.shear);
   }
@@ -224,44 +226,101 @@ class KernelOf final : public Kernel {
   ACOPLA_ONE_BODY void all_pairs(PairContacts& contacts, Particles& particles, Exports& exports, double step, ContactEnergy<double>* energy) const {
     const auto parameters = parameters_;  // a copy, which nothing that is written can change
     Meeting meetings[ahead];
+    Push pushes[ahead];
     for (std::size_t begin = 0; begin < contacts.size; begin += ahead * lanes) {
       const auto end = std::min(begin + ahead * lanes, contacts.size);
       for (std::size_t c = begin; c < end; c += lanes) meet(particles, &contacts.i[c], &contacts.j[c], step, meetings[(c - begin) / lanes]);
       for (std::size_t c = begin; c < end; c += lanes) {
-        Meeting& meeting = meetings[(c - begin) / lanes];
-        const auto count = std::min(lanes, contacts.size - c);
         HistoryLane* const stored = &contacts.history[c / lanes * numbers];
-        Pack k = meeting.kinematics;
-        const auto r = answer<ledger>(k, parameters, stored, ledger ? first_lanes(count) : DoublePack(1.0), energy);
-        const auto force = force_of(r, k.normal);
-        Turn on_i, on_j;
-        if constexpr (Model::rotates) {
-          const Turn turning = turning_of(r, k.normal);
-          on_i = -(meeting.arm_i * turning);
-          on_j = -(meeting.arm_j * turning);
-          if constexpr (Model::has_rolling) {
-            on_i = on_i + r.torque;
-            on_j = on_j - r.torque;
-          }
-        } else {
-          on_i = on_j = zero_vector<DoublePack, Pack::turns>();
-        }
-        add_forces(particles, &contacts.i[c], count, force, on_i);
-        if (!contacts.exports) add_forces(particles, &contacts.j[c], count, -force, on_j);
-        else hand_over(exports, contacts.first_export + c, count, -force, on_j);
+        const DoublePack weight = ledger ? first_lanes(std::min(lanes, contacts.size - c)) : DoublePack(1.0);
+        push<ledger>(meetings[(c - begin) / lanes], parameters, stored, weight, energy, pushes[(c - begin) / lanes]);
+      }
+      for (std::size_t c = begin; c < end; c += lanes) {
+        const Push& p = pushes[(c - begin) / lanes];
+        const auto count = std::min(lanes, contacts.size - c);
+        if (contacts.exports) push_one(particles, contacts, exports, c, count, p);
+        else push_both(particles, contacts, c, count, p);
       }
     }
+  }
+
+  // What a pack of pairs does to its particles: the force on i, the opposite on j, and on both the torque −arm × turning; rolling turns i,
+  // and j the other way.
+  struct Push {
+    Vector<DoublePack, dimension> force;
+    Turn turning, rolling;
+    DoublePack arm_i, arm_j;
+  };
+  template <bool ledger>
+  static void push(const Meeting& meeting, const typename Model::Parameters& parameters, HistoryLane* stored, const DoublePack& weight,
+                   ContactEnergy<double>* energy, Push& push) {
+    Pack k = meeting.kinematics;
+    const auto r = answer<ledger>(k, parameters, stored, weight, energy);
+    push.force = force_of(r, k.normal);
+    if constexpr (Model::rotates) {
+      push.turning = turning_of(r, k.normal);
+      push.arm_i = meeting.arm_i;
+      push.arm_j = meeting.arm_j;
+      if constexpr (Model::has_rolling) push.rolling = r.torque;
+    }
+  }
+
+  // Both bodies take the same rows: the force's, and in space the turning's, which either multiplies by its arm.
+  static void push_both(Particles& particles, const PairContacts& contacts, std::size_t c, std::size_t count, const Push& push) {
+    const std::uint32_t *const i = &contacts.i[c], *const j = &contacts.j[c];
+    if constexpr (dimension == 2) {
+      add_to(particles.force.data(), i, count, with_torque(push.force, torque_on(push, push.arm_i, 1)));
+      add_to(particles.force.data(), j, count, with_torque(-push.force, torque_on(push, push.arm_j, -1)));
+    } else {
+      Record *const force = particles.force.data(), *const torque = particles.torque.data();
+      const simd::Rows forces(record_of(push.force));
+      if constexpr (!Model::rotates) {
+        simd::for_each_lane(count, [&](std::size_t lane) {
+          forces.of(lane, [&](const auto& row) {
+            simd::add(force[i[lane]], row);
+            simd::add(force[j[lane]], -row);
+          });
+        });
+      } else {
+        const simd::Rows turnings(record_of(push.turning)), rollings(record_of(Model::has_rolling ? push.rolling : push.turning));
+        const auto *const arm_i = reinterpret_cast<const double*>(&push.arm_i), *const arm_j = reinterpret_cast<const double*>(&push.arm_j);
+        simd::for_each_lane(count, [&](std::size_t lane) {
+          forces.of(lane, [&](const auto& row) {
+            simd::add(force[i[lane]], row);
+            simd::add(force[j[lane]], -row);
+          });
+          turnings.of(lane, [&](const auto& turning) {
+            if constexpr (Model::has_rolling) {
+              rollings.of(lane, [&](const auto& rolling) {
+                simd::add(torque[i[lane]], rolling - turning * arm_i[lane]);
+                simd::add(torque[j[lane]], -rolling - turning * arm_j[lane]);
+              });
+            } else {
+              simd::add(torque[i[lane]], -(turning * arm_i[lane]));
+              simd::add(torque[j[lane]], -(turning * arm_j[lane]));
+            }
+          });
+        });
+      }
+    }
+  }
+  // The second body belongs to another partition.
+  static void push_one(Particles& particles, const PairContacts& contacts, Exports& exports, std::size_t c, std::size_t count, const Push& push) {
+    add_forces(particles, &contacts.i[c], count, push.force, torque_on(push, push.arm_i, 1));
+    const Turn torque = torque_on(push, push.arm_j, -1);
+    write(&exports.force[contacts.first_export + c], count, with_torque(-push.force, torque));
+    if constexpr (dimension == 3 && Model::rotates) write(&exports.torque[contacts.first_export + c], count, record_of(torque));
+  }
+  static Turn torque_on(const Push& push, const DoublePack& arm, double sense) {
+    if constexpr (!Model::rotates) return zero_vector<DoublePack, Pack::turns>();
+    else if constexpr (Model::has_rolling) return DoublePack(sense) * push.rolling - arm * push.turning;
+    else return -(arm * push.turning);
   }
 
   static void add_forces(Particles& particles, const std::uint32_t* which, std::size_t count, const Vector<DoublePack, dimension>& force, const Turn& torque) {
     add_to(particles.force.data(), which, count, with_torque(force, torque));
     if constexpr (dimension == 3 && Model::rotates) add_to(particles.torque.data(), which, count, record_of(torque));
   }
-  static void hand_over(Exports& exports, std::size_t first, std::size_t count, const Vector<DoublePack, dimension>& force, const Turn& torque) {
-    write(&exports.force[first], count, with_torque(force, torque));
-    if constexpr (dimension == 3 && Model::rotates) write(&exports.torque[first], count, record_of(torque));
-  }
-
   static void set_inertias(Pack& k, const Body& a, const Body& b) {
     const DoublePack i = inertia_of(a), j = inertia_of(b);
     k.reduced_inertia = i * j / (i + j);

@@ -326,10 +326,11 @@ bool WallSet::touches(std::uint32_t element, const Vec3& centre, double radius, 
 bool WallSet::touches_facet(const Facet& facet, const Vec3& body, double radius, NearestPoint& nearest) const {
   if (!frames_[facet.wall].deforms) {
     const Vec3 from_centre = body - facet.centre;
-    const double height = from_centre.dot(facet.normal), bound = radius + facet.radius;
-    if (std::abs(height) >= radius || from_centre.squaredNorm() >= bound * bound) return false;
+    // In the facet's plane the sphere is a circle; (a + b)² ≤ 2 a² + 2 b² spares the root.
+    const double height = from_centre.dot(facet.normal), left = radius * radius - height * height;
+    if (left <= 0 || from_centre.squaredNorm() - height * height >= 2 * (1 + 1e-12) * (left + facet.radius * facet.radius)) return false;
     const bool segment = facet.vertices[2] == none;
-    const double mean = segment ? 0.5 : 1.0 / 3.0, left = radius * radius - height * height;
+    const double mean = segment ? 0.5 : 1.0 / 3.0;
     std::array<double, 3> weights{};
     bool inside = true;
     for (std::size_t k = 0; k < (segment ? 2 : 3); ++k) {

@@ -186,13 +186,15 @@ class WallSet {
 
  private:
   // In body axes of a wall that does not deform. With y = x − centre: height = normal · y, weight_k = 1/size + gradient_k · y.
-  struct Facet {
-    std::array<std::uint32_t, 3> vertices;
+  // What turns most candidates away comes first, in one line of the cache.
+  struct alignas(64) Facet {
+    Vec3 centre;
+    double radius;  // of the ball around the centre that holds the vertices [m]
+    Vec3 normal;
     std::uint32_t wall;
-    Vec3 normal, centre;
+    std::array<std::uint32_t, 3> vertices;
     std::array<Vec3, 3> gradient;
     std::array<double, 3> square_height;  // of the vertices over the edges opposite [m²]
-    double radius;  // of the ball around the centre that holds the vertices [m]
   };
   struct Plane {
     Vec3 point, normal;  // now, in the world
