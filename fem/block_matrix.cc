@@ -6,85 +6,75 @@
 namespace acopla::fem {
 namespace {
 
-/// The cells of each node: those of node n are cells[starts[n]] … cells[starts[n + 1] - 1].
-struct CellsOfNodes {
-  std::vector<std::size_t> starts, cells;
-};
-
-CellsOfNodes invert(std::size_t nodes, std::span<const std::uint32_t> cell_nodes,
-                    std::size_t nodes_a_cell) {
-  CellsOfNodes result{std::vector<std::size_t>(nodes + 1, 0),
-                      std::vector<std::size_t>(cell_nodes.size())};
-  for (const auto node : cell_nodes) ++result.starts[node + 1];
-  for (std::size_t n = 0; n < nodes; ++n) result.starts[n + 1] += result.starts[n];
-  auto next = result.starts;
-  for (std::size_t i = 0; i < cell_nodes.size(); ++i)
-    result.cells[next[cell_nodes[i]]++] = i / nodes_a_cell;
-  return result;
+/// Rows of one node times x. @param blocks  of the row, each row by row
+template <int d>
+void multiply_row(std::span<const std::uint32_t> columns, const double* blocks, const double* x,
+                  double* result) {
+  double sum[d] = {};
+  for (const auto column : columns) {
+    const double* v = x + d * std::size_t{column};
+    for (int i = 0; i < d; ++i)
+      for (int j = 0; j < d; ++j) sum[i] += blocks[d * i + j] * v[j];
+    blocks += d * d;
+  }
+  for (int i = 0; i < d; ++i) result[i] = sum[i];
 }
 
 }  // namespace
 
-BlockMatrix::BlockMatrix(std::size_t nodes, std::span<const std::uint32_t> cell_nodes,
-                         std::size_t nodes_a_cell)
-    : starts_(nodes + 1, 0) {
-  const auto owners = invert(nodes, cell_nodes, nodes_a_cell);
-  std::vector<std::uint32_t> neighbours;
-  for (std::size_t n = 0; n < nodes; ++n) {
-    neighbours.clear();
-    for (auto i = owners.starts[n]; i < owners.starts[n + 1]; ++i) {
-      const auto cell = cell_nodes.subspan(owners.cells[i] * nodes_a_cell, nodes_a_cell);
-      neighbours.insert(neighbours.end(), cell.begin(), cell.end());
-    }
-    std::sort(neighbours.begin(), neighbours.end());
-    const auto last = std::unique(neighbours.begin(), neighbours.end());
-    columns_.insert(columns_.end(), neighbours.begin(), last);
-    starts_[n + 1] = columns_.size();
-  }
-  columns_.shrink_to_fit();
-  values_.assign(9 * columns_.size(), 0.0);
-}
+BlockMatrix::BlockMatrix(std::shared_ptr<const CoupledNodes> pattern, int dimension)
+    : pattern_(std::move(pattern)),
+      dimension_(dimension),
+      values_(size() * pattern_->pairs(), 0.0) {}
 
 void BlockMatrix::add(std::span<const std::uint32_t> cell, const Eigen::MatrixXd& matrix) {
-  for (std::size_t a = 0; a < cell.size(); ++a) {
-    const auto columns = row(cell[a]);
-    double* values = values_.data() + 9 * starts_[cell[a]];
+  const int d = dimension_;
+  for (std::size_t a = 0; a < cell.size(); ++a)
     for (std::size_t b = 0; b < cell.size(); ++b) {
-      const auto found = std::lower_bound(columns.begin(), columns.end(), cell[b]);
-      double* block = values + 9 * (found - columns.begin());
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          block[3 * i + j] += matrix(3 * static_cast<int>(a) + i, 3 * static_cast<int>(b) + j);
+      double* block = values_.data() + size() * pattern_->pair(cell[a], cell[b]);
+      for (int i = 0; i < d; ++i)
+        for (int j = 0; j < d; ++j)
+          block[d * i + j] += matrix(d * static_cast<int>(a) + i, d * static_cast<int>(b) + j);
     }
-  }
 }
 
 void BlockMatrix::multiply(const Vector& x, Vector& result) const {
   result.resize(x.size());
-  const double* from = x.data();
-  for (std::size_t n = 0; n < nodes(); ++n) {
-    double sum[3] = {0, 0, 0};
-    const double* block = values_.data() + 9 * starts_[n];
-    for (auto i = starts_[n]; i < starts_[n + 1]; ++i, block += 9) {
-      const double* v = from + 3 * std::size_t{columns_[i]};
-      for (int d = 0; d < 3; ++d)
-        sum[d] += block[3 * d] * v[0] + block[3 * d + 1] * v[1] + block[3 * d + 2] * v[2];
-    }
-    for (int d = 0; d < 3; ++d) result[static_cast<Eigen::Index>(3 * n) + d] = sum[d];
-  }
+  with_dimension(dimension_, [&](auto d) {
+    for (std::size_t n = 0; n < nodes(); ++n)
+      multiply_row<d>(row(n), block(n, 0), x.data(), result.data() + d * n);
+  });
+}
+
+void BlockMatrix::multiply(const Vector& x, std::span<const std::uint32_t> nodes,
+                           Vector& result) const {
+  with_dimension(dimension_, [&](auto d) {
+    for (const auto n : nodes)
+      multiply_row<d>(row(n), block(n, 0), x.data(), result.data() + d * std::size_t{n});
+  });
 }
 
 double BlockMatrix::norm() const {
   double largest = 0;
+  const auto d = static_cast<std::size_t>(dimension_);
   for (std::size_t n = 0; n < nodes(); ++n)
-    for (int d = 0; d < 3; ++d) {
+    for (std::size_t i = 0; i < d; ++i) {
       double sum = 0;
-      for (auto i = starts_[n]; i < starts_[n + 1]; ++i)
-        for (int j = 0; j < 3; ++j)
-          sum += std::abs(values_[9 * i + static_cast<std::size_t>(3 * d + j)]);
+      for (std::size_t k = 0; k < row(n).size(); ++k)
+        for (std::size_t j = 0; j < d; ++j) sum += std::abs(block(n, k)[d * i + j]);
       largest = std::max(largest, sum);
     }
   return largest;
+}
+
+BlockMatrix combine(double a, const BlockMatrix& stiffness, double b, const MassMatrix& mass) {
+  BlockMatrix result = stiffness;
+  const auto d = static_cast<std::size_t>(result.dimension_), size = d * d;
+  for (auto& value : result.values_) value *= a;
+  for (std::size_t pair = 0; pair < mass.values().size(); ++pair)
+    for (std::size_t i = 0; i < d; ++i)
+      result.values_[size * pair + (d + 1) * i] += b * mass.values()[pair];
+  return result;
 }
 
 }  // namespace acopla::fem

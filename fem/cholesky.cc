@@ -88,13 +88,15 @@ void compute_in_one_thread() {
 
 struct Cholesky::State {
   const BlockMatrix& matrix;
+  std::size_t dimension;
   FreeUnknowns free;
   cholmod_common common{};
   cholmod_factor* factor = nullptr;
   cholmod_dense *b = nullptr, *x = nullptr, *work_y = nullptr, *work_e = nullptr;
   double flops = 0;
 
-  State(const BlockMatrix& matrix_, const Fixed& fixed) : matrix(matrix_), free(fixed) {
+  State(const BlockMatrix& matrix_, const Fixed& fixed)
+      : matrix(matrix_), dimension(static_cast<std::size_t>(matrix_.dimension())), free(fixed) {
     cholmod_l_start(&common);
     common.print = 0;
   }
@@ -119,11 +121,13 @@ struct Cholesky::State {
   /// Calls entry(position, value) for the free unknowns that couple with `unknown`.
   template <class Entry>
   void visit_row(std::size_t unknown, Entry&& entry) const {
-    const auto row = matrix.row(unknown / 3);
+    const auto row = matrix.row(unknown / dimension);
     for (std::size_t k = 0; k < row.size(); ++k)
-      for (std::size_t d = 0; d < 3; ++d) {
-        const auto position = free.positions[3 * std::size_t{row[k]} + d];
-        if (position >= 0) entry(position, matrix.block(unknown / 3, k)[3 * (unknown % 3) + d]);
+      for (std::size_t d = 0; d < dimension; ++d) {
+        const auto position = free.positions[dimension * std::size_t{row[k]} + d];
+        if (position >= 0)
+          entry(position,
+                matrix.block(unknown / dimension, k)[dimension * (unknown % dimension) + d]);
       }
   }
 };
@@ -144,8 +148,8 @@ std::vector<Index> Cholesky::State::order() {
   if (!done) out_of_memory("order");
   result.reserve(free.unknowns.size());
   for (const auto n : nodes)
-    for (std::size_t d = 0; d < 3; ++d) {
-      const auto position = free.positions[3 * static_cast<std::size_t>(n) + d];
+    for (std::size_t d = 0; d < dimension; ++d) {
+      const auto position = free.positions[dimension * static_cast<std::size_t>(n) + d];
       if (position >= 0) result.push_back(position);
     }
   return result;
@@ -180,10 +184,10 @@ cholmod_sparse* Cholesky::State::ordered_matrix() {
 }
 
 double Cholesky::State::diagonal(std::size_t unknown) const {
-  const auto node = unknown / 3;
+  const auto node = unknown / dimension;
   const auto row = matrix.row(node);
   const auto k = std::lower_bound(row.begin(), row.end(), node) - row.begin();
-  return matrix.block(node, static_cast<std::size_t>(k))[4 * (unknown % 3)];
+  return matrix.block(node, static_cast<std::size_t>(k))[(dimension + 1) * (unknown % dimension)];
 }
 
 /// The first column of the factor without a sound pivot. CHOLMOD stops at pivots that are not
@@ -234,11 +238,11 @@ void Cholesky::factor(const std::vector<Vec3>& points) {
   const auto failed = s.first_round_off();
   if (!failed) return;
   const auto unknown = s.unknown_of(*failed);
-  const auto& p = points[unknown / 3];
+  const auto& p = points[unknown / s.dimension];
   throw io::UserError(fmt::format(
       "The structure is a mechanism: near ({:.4g}, {:.4g}, {:.4g}) it can move along {} without "
       "strain. Look for parts that touch in a point or an edge only.",
-      p[0], p[1], p[2], "xyz"[unknown % 3]));
+      p[0], p[1], p[2], "xyz"[unknown % s.dimension]));
 }
 
 void Cholesky::solve(const Vector& b, Vector& x) {

@@ -37,10 +37,12 @@ void start_mpi() {
 
 /// The matrix with held rows and columns replaced by their diagonal.
 std::unique_ptr<TrilinosMatrix> copy_supported(const BlockMatrix& matrix, const Fixed& fixed) {
-  std::vector<unsigned> entries(3 * matrix.nodes());
+  const auto dimension = static_cast<std::size_t>(matrix.dimension());
+  std::vector<unsigned> entries(dimension * matrix.nodes());
   for (std::size_t n = 0; n < matrix.nodes(); ++n)
-    for (std::size_t d = 0; d < 3; ++d)
-      entries[3 * n + d] = fixed[3 * n + d] ? 1 : static_cast<unsigned>(3 * matrix.row(n).size());
+    for (std::size_t d = 0; d < dimension; ++d)
+      entries[dimension * n + d] =
+          fixed[dimension * n + d] ? 1 : static_cast<unsigned>(dimension * matrix.row(n).size());
   const auto size = static_cast<dealii::types::global_dof_index>(entries.size());
   auto result = std::make_unique<TrilinosMatrix>(size, size, entries);
   std::vector<dealii::types::global_dof_index> columns;
@@ -48,13 +50,13 @@ std::unique_ptr<TrilinosMatrix> copy_supported(const BlockMatrix& matrix, const 
   for (std::size_t i = 0; i < entries.size(); ++i) {
     columns.clear();
     values.clear();
-    const auto row = matrix.row(i / 3);
+    const auto row = matrix.row(i / dimension);
     for (std::size_t k = 0; k < row.size(); ++k)
-      for (std::size_t d = 0; d < 3; ++d) {
-        const auto j = 3 * std::size_t{row[k]} + d;
+      for (std::size_t d = 0; d < dimension; ++d) {
+        const auto j = dimension * std::size_t{row[k]} + d;
         if (i != j && (fixed[i] || fixed[j])) continue;
         columns.push_back(static_cast<dealii::types::global_dof_index>(j));
-        values.push_back(matrix.block(i / 3, k)[3 * (i % 3) + d]);
+        values.push_back(matrix.block(i / dimension, k)[dimension * (i % dimension) + d]);
       }
     result->set(static_cast<dealii::types::global_dof_index>(i), columns, values);
   }
@@ -62,21 +64,24 @@ std::unique_ptr<TrilinosMatrix> copy_supported(const BlockMatrix& matrix, const 
   return result;
 }
 
-/// The six rigid-body modes at the free unknowns, mode after mode.
+int rigid_mode_count(int dimension) { return dimension == 2 ? 3 : 6; }
+
+/// The rigid-body modes at the free unknowns, mode after mode: moves, then turns (about z in 2D).
 std::vector<double> rigid_modes(const Mesh& mesh, const Fixed& fixed) {
+  const int dimension = mesh.dimension();
   const auto size = fixed.size();
-  std::vector<double> modes(6 * size, 0.0);
+  std::vector<double> modes(static_cast<std::size_t>(rigid_mode_count(dimension)) * size, 0.0);
   Vec3 centre = Vec3::Zero();
   for (const auto& p : mesh.points()) centre += p / static_cast<double>(mesh.nodes());
   for (std::size_t n = 0; n < mesh.nodes(); ++n)
-    for (int axis = 0; axis < 3; ++axis) {
-      const Vec3 turn = Vec3(Vec3::Unit(axis)).cross(mesh.points()[n] - centre);
-      for (int d = 0; d < 3; ++d) {
-        const auto i = 3 * n + static_cast<std::size_t>(d);
-        if (fixed[i]) continue;
-        modes[static_cast<std::size_t>(axis) * size + i] = d == axis ? 1.0 : 0.0;
-        modes[static_cast<std::size_t>(3 + axis) * size + i] = turn[d];
-      }
+    for (int d = 0; d < dimension; ++d) {
+      const auto i = static_cast<std::size_t>(dimension) * n + static_cast<std::size_t>(d);
+      if (fixed[i]) continue;
+      auto mode = static_cast<std::size_t>(d);
+      modes[mode * size + i] = 1;
+      mode = static_cast<std::size_t>(dimension);
+      for (int axis = dimension == 2 ? 2 : 0; axis < 3; ++axis)
+        modes[mode++ * size + i] = Vec3(Vec3::Unit(axis)).cross(mesh.points()[n] - centre)[d];
     }
   return modes;
 }
@@ -111,9 +116,9 @@ class ConjugateGradients : public LinearSolver {
     Teuchos::ParameterList list;
     std::unique_ptr<Epetra_MultiVector> unused;
     data.set_parameters(list, unused, *copy_);
-    list.set("PDE equations", 3);
+    list.set("PDE equations", mesh_.dimension());
     list.set("null space: type", "pre-computed");
-    list.set("null space: dimension", 6);
+    list.set("null space: dimension", rigid_mode_count(mesh_.dimension()));
     list.set("null space: vectors", modes_.data());
     multigrid_ = std::make_unique<dealii::TrilinosWrappers::PreconditionAMG>();
     multigrid_->initialize(*copy_, list);

@@ -7,68 +7,106 @@
 #include <Eigen/QR>
 
 #include "fem/discretisation.h"
+#include "fem/nodal.h"
 
 namespace acopla::fem {
 namespace {
 
-Table tabulate(const dealii::FiniteElement<3>& element,
-               const std::vector<dealii::Point<3>>& points) {
+template <int d>
+Eigen::MatrixXd coordinates(const std::vector<dealii::Point<d>>& points) {
+  Eigen::MatrixXd result(d, std::ssize(points));
+  for (std::size_t q = 0; q < points.size(); ++q)
+    for (unsigned c = 0; c < d; ++c)
+      result(static_cast<int>(c), static_cast<int>(q)) = points[q][c];
+  return result;
+}
+
+template <int d>
+Table tabulate(const dealii::FiniteElement<d>& element,
+               const std::vector<dealii::Point<d>>& points) {
   const auto nodes = static_cast<int>(element.n_dofs_per_cell());
   Table table;
+  table.points_in_cell = coordinates<d>(points);
   table.values.resize(nodes, static_cast<int>(points.size()));
   for (std::size_t q = 0; q < points.size(); ++q) {
-    Eigen::Matrix<double, Eigen::Dynamic, 3> gradient(nodes, 3);
+    Eigen::MatrixXd gradient(nodes, d);
     for (int a = 0; a < nodes; ++a) {
       const auto node = static_cast<unsigned>(a);
       table.values(a, static_cast<int>(q)) = element.shape_value(node, points[q]);
       const auto slope = element.shape_grad(node, points[q]);
-      gradient.row(a) = Eigen::RowVector3d(slope[0], slope[1], slope[2]);
+      for (unsigned c = 0; c < d; ++c) gradient(a, static_cast<int>(c)) = slope[c];
     }
     table.gradients.push_back(std::move(gradient));
   }
   return table;
 }
 
-Table tabulate(const dealii::FiniteElement<3>& element, const dealii::Quadrature<3>& quadrature) {
-  Table table = tabulate(element, quadrature.get_points());
+template <int d>
+Table tabulate(const dealii::FiniteElement<d>& element, const dealii::Quadrature<d>& quadrature) {
+  Table table = tabulate<d>(element, quadrature.get_points());
   const auto& weights = quadrature.get_weights();
   table.weights = Eigen::Map<const Eigen::VectorXd>(weights.data(), std::ssize(weights));
   return table;
 }
 
-dealii::Quadrature<3> quadrature(bool simplex, int points_a_direction) {
+template <int d>
+dealii::Quadrature<d> quadrature(bool simplex, int points_a_direction) {
   const auto count = static_cast<unsigned>(points_a_direction);
-  if (simplex) return dealii::QGaussSimplex<3>(count);
-  return dealii::QGauss<3>(count);
+  if (simplex) return dealii::QGaussSimplex<d>(count);
+  return dealii::QGauss<d>(count);
 }
 
-Eigen::MatrixXd fit(const dealii::FiniteElement<3>& element, const dealii::FiniteElement<3>& linear,
-                    const std::vector<dealii::Point<3>>& points) {
+/// Exact for products of two shape functions, of degree 2 or 4 on simplices.
+template <int d>
+dealii::Quadrature<d> mass_quadrature(bool simplex, int degree) {
+  const auto count = static_cast<unsigned>(degree + 1);
+  if (simplex) return dealii::QWitherdenVincentSimplex<d>(count);
+  return dealii::QGauss<d>(count);
+}
+
+template <int d>
+Eigen::MatrixXd fit(const dealii::FiniteElement<d>& element, const dealii::FiniteElement<d>& linear,
+                    const std::vector<dealii::Point<d>>& points) {
   const auto nodes = static_cast<int>(element.n_dofs_per_cell());
   if (points.size() == 1) return Eigen::MatrixXd::Ones(nodes, 1);
   // Values c at the corners such that A c fits those at the points, by least squares.
   const auto count = std::ssize(points);
-  const Eigen::MatrixXd at_points = tabulate(linear, points).values.transpose();
+  const Eigen::MatrixXd at_points = tabulate<d>(linear, points).values.transpose();
   const Eigen::MatrixXd corners =
       at_points.colPivHouseholderQr().solve(Eigen::MatrixXd::Identity(count, count));
-  return tabulate(linear, element.get_unit_support_points()).values.transpose() * corners;
+  return tabulate<d>(linear, element.get_unit_support_points()).values.transpose() * corners;
 }
 
 }  // namespace
 
-std::unique_ptr<dealii::FiniteElement<3>> make_element(bool simplex, int degree) {
+template <int d>
+std::unique_ptr<dealii::FiniteElement<d>> make_element(bool simplex, int degree) {
   const auto order = static_cast<unsigned>(degree);
-  if (simplex) return std::make_unique<dealii::FE_SimplexP<3>>(order);
-  return std::make_unique<dealii::FE_Q<3>>(order);
+  if (simplex) return std::make_unique<dealii::FE_SimplexP<d>>(order);
+  return std::make_unique<dealii::FE_Q<d>>(order);
+}
+template std::unique_ptr<dealii::FiniteElement<2>> make_element<2>(bool, int);
+template std::unique_ptr<dealii::FiniteElement<3>> make_element<3>(bool, int);
+
+Element::Element(int dimension_, bool simplex_, int degree_)
+    : dimension(dimension_), simplex(simplex_), degree(degree_) {
+  with_dimension(dimension, [&](auto d) {
+    const auto element = make_element<d>(simplex, degree), linear = make_element<d>(simplex, 1);
+    nodes = static_cast<int>(element->n_dofs_per_cell());
+    support = coordinates<d>(element->get_unit_support_points());
+    stiffness = tabulate<d>(*element, quadrature<d>(simplex, simplex ? degree : degree + 1));
+    mass = tabulate<d>(*element, mass_quadrature<d>(simplex, degree));
+    const auto points = quadrature<d>(simplex, simplex ? degree : 2);
+    stress = tabulate<d>(*element, points);
+    extrapolation = fit<d>(*element, *linear, points.get_points());
+  });
 }
 
-Element::Element(bool simplex_, int degree_) : simplex(simplex_), degree(degree_) {
-  const auto element = make_element(simplex, degree), linear = make_element(simplex, 1);
-  nodes = static_cast<int>(element->n_dofs_per_cell());
-  stiffness = tabulate(*element, quadrature(simplex, simplex ? degree : degree + 1));
-  const auto points = quadrature(simplex, simplex ? degree : 2);
-  stress = tabulate(*element, points);
-  extrapolation = fit(*element, *linear, points.get_points());
+Eigen::MatrixXd Element::volumetric(const Table& table) const {
+  const auto count = std::ssize(table.gradients);
+  Eigen::MatrixXd result = Eigen::MatrixXd::Ones(degree == 1 ? 1 : 1 + dimension, count);
+  if (degree == 2) result.bottomRows(dimension) = table.points_in_cell;
+  return result;
 }
 
 }  // namespace acopla::fem

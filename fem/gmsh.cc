@@ -118,7 +118,7 @@ std::size_t nodes_of_type(const Scanner& scanner, std::int64_t type) {
 
 class Reader {
  public:
-  explicit Reader(const std::string& path) : in_(path) {}
+  Reader(const std::string& path, int dimension) : in_(path) { mesh_.dimension = dimension; }
 
   GmshMesh read() {
     while (!in_.at_end()) {
@@ -163,7 +163,7 @@ class Reader {
         in_.skip_numbers(dimension == 0 ? 3 : 6);
         for (auto groups = in_.count(); groups > 0; --groups) {
           const auto group = static_cast<int>(std::abs(in_.integer()));
-          if (dimension == 2) groups_of_surface_[tag].push_back(group);
+          groups_of_[static_cast<std::size_t>(dimension)][tag].push_back(group);
         }
         if (dimension > 0) in_.skip_numbers(in_.count());
       }
@@ -223,7 +223,8 @@ class Reader {
     in_.skip_numbers(3);
     for (std::size_t b = 0; b < blocks; ++b) {
       const auto dimension = in_.integer(), entity = in_.integer(), type = in_.integer();
-      const auto groups = dimension == 2 ? groups_of_surface_[entity] : std::vector<int>{};
+      if (dimension < 0 || dimension > 3) in_.fail(fmt::format("{} is no dimension.", dimension));
+      const auto& groups = groups_of_[static_cast<std::size_t>(dimension)][entity];
       for (auto left = in_.count(); left > 0; --left) {
         in_.integer();
         read_element(type, groups);
@@ -240,22 +241,42 @@ class Reader {
       if (found == index_of_.end()) in_.fail(fmt::format("there is no node {}.", tag));
       nodes[i] = found->second;
     }
-    if (type == 2 || type == 3) {
-      FaceKey key{nodes[0], nodes[1], nodes[2], type == 3 ? nodes[3] : no_corner};
-      std::sort(key.begin(), key.end());
-      for (const int group : groups) mesh_.surfaces[group].push_back(key);
-    } else if (type == 4 || type == 5) {
-      add_cell(type == 4, nodes);
+    const int dimension = type == 15 ? 0 : type == 1 ? 1 : type <= 3 ? 2 : 3;
+    if (dimension > mesh_.dimension)
+      in_.fail(
+          "has solid cells, but the case says dimension = 2. A structure in 2D is meshed in the "
+          "plane z = 0.");
+    if (dimension == mesh_.dimension) {
+      add_cell(type == 2 || type == 4, nodes, groups);
+      return;
     }
+    if (dimension == 0) {
+      for (const int group : groups) mesh_.places[group].push_back(nodes[0]);
+      return;
+    }
+    FaceKey key;
+    key.fill(no_corner);
+    std::copy_n(nodes.begin(), count, key.begin());
+    std::sort(key.begin(), key.end());
+    auto& parts = dimension + 1 == mesh_.dimension ? mesh_.boundaries : mesh_.curves;
+    for (const int group : groups) parts[group].push_back(key);
   }
 
-  void add_cell(bool simplex, std::array<std::uint32_t, 8> nodes) {
+  void add_cell(bool simplex, std::array<std::uint32_t, 8> nodes, const std::vector<int>& groups) {
     if (!mesh_.cells.empty() && simplex != mesh_.simplex)
-      in_.fail("mixes hexahedra and tetrahedra. Use one of them alone.");
+      in_.fail(fmt::format("mixes {}. Use one of them alone.", mesh_.dimension == 2
+                                                                   ? "quadrilaterals and triangles"
+                                                                   : "hexahedra and tetrahedra"));
     mesh_.simplex = simplex;
+    for (const int group : groups)
+      mesh_.solids[group].push_back(static_cast<std::uint32_t>(mesh_.cells.size()));
     const auto p = [&](std::size_t i) -> const Vec3& { return mesh_.points[nodes[i]]; };
     // Elements may be numbered left-handed; turn those.
-    if (simplex) {
+    if (mesh_.dimension == 2) {
+      const auto last = mesh_.corners() - 1;  // diagonals of a quadrilateral, sides of a triangle
+      if ((p(last - 1) - p(0)).cross(p(last) - p(simplex ? 0 : 1))[2] < 0)
+        std::reverse(nodes.begin(), nodes.begin() + last + 1);
+    } else if (simplex) {
       if ((p(1) - p(0)).cross(p(2) - p(0)).dot(p(3) - p(0)) < 0) std::swap(nodes[0], nodes[1]);
     } else {
       const Vec3 below = p(0) + p(1) + p(2) + p(3), above = p(4) + p(5) + p(6) + p(7);
@@ -265,18 +286,39 @@ class Reader {
     mesh_.cells.push_back(nodes);
   }
 
-  std::size_t corners() const { return mesh_.simplex ? 4 : 8; }
-
   void finish() {
     if (mesh_.cells.empty())
       in_.fail_whole(
-          "has no cells. Put the solid in a Physical Volume: gmsh saves named parts only.");
+          fmt::format("has no cells. Put the solid in a Physical {}: gmsh saves named parts only.",
+                      mesh_.dimension == 2 ? "Surface" : "Volume"));
     drop_repeated_cells();
     check_faces();
     drop_unused_points();
-    for (auto& [group, faces] : mesh_.surfaces) {
-      std::sort(faces.begin(), faces.end());
-      faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+    check_plane();
+    for (auto& [group, cells] : mesh_.solids) sort_once(cells);
+    for (auto& [group, faces] : mesh_.boundaries) sort_once(faces);
+    for (auto& [group, edges] : mesh_.curves) sort_once(edges);
+    for (auto& [group, points] : mesh_.places) sort_once(points);
+  }
+
+  template <class T>
+  static void sort_once(std::vector<T>& parts) {
+    std::sort(parts.begin(), parts.end());
+    parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
+  }
+
+  void check_plane() {
+    if (mesh_.dimension == 3) return;
+    double extent = 0;
+    for (const auto& p : mesh_.points) extent = std::max({extent, std::abs(p[0]), std::abs(p[1])});
+    for (auto& p : mesh_.points) {
+      if (std::abs(p[2]) > 1e-9 * extent)
+        in_.fail_whole(
+            fmt::format("has a node at ({:.6g}, {:.6g}, {:.6g}), off the plane z = 0. A structure "
+                        "in 2D lies in that "
+                        "plane.",
+                        p[0], p[1], p[2]));
+      p[2] = 0;
     }
   }
 
@@ -285,25 +327,38 @@ class Reader {
     std::vector<std::pair<std::array<std::uint32_t, 8>, std::size_t>> sorted;
     for (std::size_t c = 0; c < mesh_.cells.size(); ++c) {
       auto nodes = mesh_.cells[c];
-      std::sort(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(corners()));
-      for (std::size_t i = 1; i < corners(); ++i)
+      std::sort(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(mesh_.corners()));
+      for (std::size_t i = 1; i < mesh_.corners(); ++i)
         if (nodes[i] == nodes[i - 1]) in_.fail_whole("has a cell with a corner twice.");
       sorted.emplace_back(nodes, c);
     }
     std::sort(sorted.begin(), sorted.end());
-    std::vector<char> repeated(mesh_.cells.size(), 0);
-    for (std::size_t i = 1; i < sorted.size(); ++i)
-      if (sorted[i].first == sorted[i - 1].first) repeated[sorted[i].second] = 1;
-    std::size_t kept = 0;
-    for (std::size_t c = 0; c < mesh_.cells.size(); ++c)
-      if (!repeated[c]) mesh_.cells[kept++] = mesh_.cells[c];
+    std::vector<std::size_t> same_as(mesh_.cells.size());  // the first of the cells that are one
+    for (std::size_t i = 0, first = 0; i < sorted.size(); ++i) {
+      if (sorted[i].first != sorted[first].first) first = i;
+      same_as[sorted[i].second] = sorted[first].second;
+    }
+    std::vector<std::uint32_t> number(mesh_.cells.size());
+    std::uint32_t kept = 0;
+    for (std::size_t c = 0; c < mesh_.cells.size(); ++c) {
+      if (same_as[c] == c) {
+        mesh_.cells[kept] = mesh_.cells[c];
+        number[c] = kept++;
+      } else {
+        number[c] = number[same_as[c]];
+      }
+    }
     mesh_.cells.resize(kept);
+    for (auto& [group, cells] : mesh_.solids)
+      for (auto& cell : cells) cell = number[cell];
   }
 
   void check_faces() const {
     static constexpr int of_hexahedron[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4},
                                                 {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
     static constexpr int of_tetrahedron[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
+    static constexpr int of_quadrilateral[4][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}},
+                         of_triangle[3][2] = {{0, 1}, {1, 2}, {2, 0}};
     std::vector<FaceKey> faces;
     const auto add = [&](const auto& cell, const auto& corners_of_face) {
       FaceKey key;
@@ -314,7 +369,11 @@ class Reader {
       faces.push_back(key);
     };
     for (const auto& cell : mesh_.cells) {
-      if (mesh_.simplex)
+      if (mesh_.dimension == 2 && mesh_.simplex)
+        for (const auto& edge : of_triangle) add(cell, edge);
+      else if (mesh_.dimension == 2)
+        for (const auto& edge : of_quadrilateral) add(cell, edge);
+      else if (mesh_.simplex)
         for (const auto& face : of_tetrahedron) add(cell, face);
       else
         for (const auto& face : of_hexahedron) add(cell, face);
@@ -324,8 +383,8 @@ class Reader {
       if (faces[i] == faces[i - 2]) {
         const auto& p = mesh_.points[faces[i][0]];
         in_.fail_whole(fmt::format(
-            "has a face that three cells share, at ({:.6g}, {:.6g}, {:.6g}). Mesh it again.", p[0],
-            p[1], p[2]));
+            "has {} that three cells share, at ({:.6g}, {:.6g}, {:.6g}). Mesh it again.",
+            mesh_.dimension == 2 ? "an edge" : "a face", p[0], p[1], p[2]));
       }
   }
 
@@ -333,7 +392,7 @@ class Reader {
     constexpr auto unused = no_corner;
     std::vector<std::uint32_t> number(mesh_.points.size(), unused);
     for (const auto& cell : mesh_.cells)
-      for (std::size_t i = 0; i < corners(); ++i) number[cell[i]] = 0;
+      for (std::size_t i = 0; i < mesh_.corners(); ++i) number[cell[i]] = 0;
     std::uint32_t kept = 0;
     for (std::size_t n = 0; n < number.size(); ++n) {
       if (number[n] == unused) continue;
@@ -342,24 +401,30 @@ class Reader {
     }
     mesh_.points.resize(kept);
     for (auto& cell : mesh_.cells)
-      for (std::size_t i = 0; i < corners(); ++i) cell[i] = number[cell[i]];
-    for (auto& [group, faces] : mesh_.surfaces)
-      for (auto& face : faces) {
-        for (auto& node : face)
-          if (node != no_corner) node = number[node];
-        std::sort(face.begin(), face.end());
-      }
+      for (std::size_t i = 0; i < mesh_.corners(); ++i) cell[i] = number[cell[i]];
+    for (auto* parts : {&mesh_.boundaries, &mesh_.curves})
+      for (auto& [group, faces] : *parts)
+        for (auto& face : faces) {
+          for (auto& node : face)
+            if (node != no_corner) node = number[node];
+          std::sort(face.begin(), face.end());
+        }
+    for (auto& [group, points] : mesh_.places)
+      for (auto& point : points) point = number[point];
   }
 
   Scanner in_;
   double version_ = 0;
   GmshMesh mesh_;
   std::unordered_map<std::int64_t, std::uint32_t> index_of_;
-  std::unordered_map<std::int64_t, std::vector<int>> groups_of_surface_;
+  std::array<std::unordered_map<std::int64_t, std::vector<int>>, 4>
+      groups_of_;  // by dimension and entity
 };
 
 }  // namespace
 
-GmshMesh read_gmsh(const std::string& path) { return Reader(path).read(); }
+GmshMesh read_gmsh(const std::string& path, int dimension) {
+  return Reader(path, dimension).read();
+}
 
 }  // namespace acopla::fem

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "fem/mesh.h"
+#include "fem/mesh_source.h"
 #include "io/case_table.h"
 
 namespace acopla::fem {
@@ -37,17 +37,24 @@ PhysicalGroup parse_group(const std::string& path, const std::string& line) {
   return group;
 }
 
-std::string list_of_surfaces(const std::vector<PhysicalGroup>& groups, const std::string& name) {
+constexpr const char* kinds[] = {"points", "curves", "surfaces", "volumes"};
+constexpr const char* kind_in_gmsh[] = {"Point", "Curve", "Surface", "Volume"};
+
+std::string list_of_groups(const std::vector<PhysicalGroup>& groups, const std::string& name,
+                           std::size_t dimension) {
   std::vector<std::string> names;
   std::string text;
   for (const auto& group : groups) {
-    if (group.dimension != 2) continue;
+    if (static_cast<std::size_t>(group.dimension) != dimension) continue;
     text += (text.empty() ? "" : ", ") + group.name;
     names.push_back(group.name);
   }
-  if (text.empty()) return "The mesh names no surface (gmsh: Physical Surface(\"name\") = {…}).";
+  const std::string kind = kinds[dimension];
+  if (text.empty())
+    return "The mesh names no " + kind.substr(0, kind.size() - 1) + " (gmsh: Physical " +
+           kind_in_gmsh[dimension] + "(\"name\") = {…}).";
   const auto nearest = io::nearest_word(name, names);
-  return "The mesh has the surfaces " + text + "." +
+  return "The mesh has the " + kind + " " + text + "." +
          (nearest ? " Did you mean \"" + *nearest + "\"?" : "");
 }
 
@@ -75,19 +82,25 @@ std::vector<PhysicalGroup> read_physical_groups(const std::string& path) {
   return groups;
 }
 
-const PhysicalGroup& find_surface(const std::vector<PhysicalGroup>& groups,
-                                  const std::string& name) {
+const PhysicalGroup& find_group(const std::vector<PhysicalGroup>& groups, const std::string& name,
+                                int dimension) {
+  const auto wanted = static_cast<std::size_t>(dimension);
   const auto named = [&](const PhysicalGroup& group) { return group.name == name; };
-  const auto is_surface = [&](const PhysicalGroup& g) { return named(g) && g.dimension == 2; };
-  const auto surface = std::find_if(groups.begin(), groups.end(), is_surface);
-  if (surface != groups.end()) return *surface;
+  const auto found = std::find_if(groups.begin(), groups.end(), [&](const PhysicalGroup& group) {
+    return named(group) && group.dimension == dimension;
+  });
+  if (found != groups.end()) return *found;
   const auto other = std::find_if(groups.begin(), groups.end(), named);
   if (other == groups.end())
-    throw std::invalid_argument("is not in the mesh. " + list_of_surfaces(groups, name));
-  static constexpr const char* kinds[] = {"points", "curves", "surfaces", "volumes"};
+    throw std::invalid_argument("is not in the mesh. " + list_of_groups(groups, name, wanted));
   const auto kind = static_cast<std::size_t>(std::clamp(other->dimension, 0, 3));
-  throw std::invalid_argument(std::string("is made of ") + kinds[kind] +
-                              "; a surface is needed here. " + list_of_surfaces(groups, name));
+  const std::string singular(kinds[wanted], std::string(kinds[wanted]).size() - 1);
+  throw std::invalid_argument(std::string("is made of ") + kinds[kind] + "; a " + singular +
+                              " is needed here. " + list_of_groups(groups, name, wanted));
+}
+
+MeshSource MeshSource::from_file(const std::string& path, int dimension) {
+  return {path, read_gmsh(path, dimension), read_physical_groups(path), {}, {}};
 }
 
 }  // namespace acopla::fem

@@ -6,7 +6,7 @@
 
 namespace acopla::fem {
 
-Interface::Interface(const Mesh& mesh, const std::string& group) {
+Interface::Interface(const Mesh& mesh, const std::string& group) : dimension_(mesh.dimension()) {
   const auto faces = mesh.boundary(group);
   for (const auto& face : faces)
     nodes_.insert(nodes_.end(), face.used().begin(), face.used().end());
@@ -32,14 +32,14 @@ void Interface::add_forces(std::span<const Vec3> forces, Vector& load) const {
   for (std::size_t i = 0; i < forces.size(); ++i) {
     if (!forces[i].allFinite())
       throw std::invalid_argument("got a force that is not finite, at point " + std::to_string(i));
-    load.segment<3>(3 * Eigen::Index{nodes_[i]}) += forces[i];
+    add_at(load, nodes_[i], dimension_, forces[i]);
   }
 }
 
 std::vector<Vec3> Interface::values(const Vector& nodal) const {
   std::vector<Vec3> result;
   result.reserve(nodes_.size());
-  for (const auto node : nodes_) result.emplace_back(nodal.segment<3>(3 * Eigen::Index{node}));
+  for (const auto node : nodes_) result.push_back(value_at(nodal, node, dimension_));
   return result;
 }
 

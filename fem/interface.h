@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "fem/block_matrix.h"
 #include "fem/mesh.h"
+#include "fem/nodal.h"
 
 namespace acopla::fem {
 
-/// Faces of a physical group, of the element's own order. Its points are nodes of the mesh in
-/// ascending order.
+/// Faces of a physical group, of the element's own order; lines in 2D. Its points are nodes of the
+/// mesh in ascending order.
 class Interface {
  public:
   /// @throws std::invalid_argument as Mesh::boundary
@@ -28,6 +28,7 @@ class Interface {
   std::vector<Vec3> values(const Vector& nodal) const;
 
  private:
+  int dimension_;
   std::vector<std::uint32_t> nodes_;
   geometry::SurfaceMesh surface_;
 };

@@ -44,7 +44,7 @@ struct ChosenSolver {
 ChosenSolver choose_solver(const BlockMatrix& matrix, const Mesh& mesh, const Fixed& fixed,
                            const SolverOptions& options);
 
-/// Conjugate gradients, preconditioned by smoothed aggregation (Trilinos ML) that knows the six
+/// Conjugate gradients, preconditioned by smoothed aggregation (Trilinos ML) that knows the
 /// rigid-body modes (Vaněk, Mandel & Brezina 1996). Arguments as above.
 std::unique_ptr<LinearSolver> make_conjugate_gradients(const BlockMatrix& matrix, const Mesh& mesh,
                                                        const Fixed& fixed, double tolerance);

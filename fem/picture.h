@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "fem/block_matrix.h"
 #include "fem/mesh.h"
+#include "fem/nodal.h"
 
 namespace acopla::fem {
 

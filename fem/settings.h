@@ -6,28 +6,70 @@
 #include <string>
 #include <vector>
 
+#include "fem/dynamics.h"
+#include "fem/formulation.h"
 #include "fem/linear_solver.h"
-#include "fem/material.h"
+#include "fem/loads.h"
 #include "fem/mesh.h"
+#include "fem/part.h"
+#include "fem/shapes.h"
 #include "io/case_table.h"
 
 namespace acopla::fem {
 
 struct Settings {
-  struct Fix {
-    std::string group;  ///< physical surface
+  Settings(std::string participant, io::Table of_case)
+      : name(std::move(participant)), table(std::move(of_case)) {}
+
+  /// A part held in some directions, or moved.
+  struct Support {
+    io::Table table;
+    Part part;
     std::array<bool, 3> directions;
+    bool moves = false;
+    Vec3 value = Vec3::Zero();  ///< displacement [m], or velocity [m/s], at amplitude 1
+    MotionHistory history;
+  };
+  /// A material and the group of cells that it fills; no group: all cells.
+  struct MaterialOfPart {
+    io::Table table;
+    std::string group;
+    Material material;
+  };
+  /// A node whose motion, and stress where asked for, is reported of every window.
+  struct Probe {
+    io::Table table;
+    std::string name;
+    Vec3 at;  ///< [m]; the nearest node is taken
+    bool stress = false;
+  };
+  /// Of a dynamic analysis.
+  struct Motion {
+    Scheme scheme;
+    Rayleigh damping;
+    std::optional<double> step;  ///< longest step [s]; empty: one a window
+    bool from_equilibrium =
+        true;  ///< under weight and loads at t = 0; otherwise from rest without strain
   };
 
   std::string name;  ///< of the participant
   io::Table table;   ///< for messages about what shows later, e.g. a structure left free
-  std::string mesh;  ///< absolute path
+  int dimension = 3;
+  Formulation formulation;
+  MeshChoice mesh;
   int degree = 2;
-  Material material;
-  std::vector<Fix> fixes;
+  std::vector<MaterialOfPart> materials;
+  std::vector<Support> supports;
+  std::vector<Load> loads;
+  std::optional<Motion> motion;  ///< empty: static
   SolverOptions solver;
   bool vtu = true;
   std::optional<double> every;  ///< time between pictures [s]; empty: the last window only
+  bool von_mises = true;        ///< report the largest von Mises stress of every window
+  std::vector<Probe> probes;
+  bool reactions = false;       ///< report the reaction of each support
+  std::size_t frequencies = 0;  ///< lowest natural frequencies to report at the end
+  bool energy = false;          ///< report the energy balance of a structure in motion
 };
 
 /// Reads and checks table `name` of the case, and the names of the mesh's physical groups.

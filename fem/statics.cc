@@ -12,14 +12,18 @@ constexpr double sound_backward_error = 1e-14;
 
 }  // namespace
 
-Vec3 total(const Vector& nodal) { return nodal.reshaped(3, nodal.size() / 3).rowwise().sum(); }
+Statics::Statics(const Mesh& mesh, const Materials& materials, const Fixed& fixed,
+                 const SolverOptions& options, const Formulation& formulation)
+    : fixed_(fixed),
+      own_(std::make_unique<BlockMatrix>(assemble_stiffness(mesh, materials, formulation))),
+      stiffness_(*own_),
+      norm_(stiffness_.norm()),
+      chosen_(choose_solver(stiffness_, mesh, fixed, options)) {}
 
-Vec3 StaticSolution::total_reaction() const { return total(reaction); }
-
-Statics::Statics(const Mesh& mesh, const Material& material, const Fixed& fixed,
+Statics::Statics(const Mesh& mesh, const BlockMatrix& stiffness, const Fixed& fixed,
                  const SolverOptions& options)
     : fixed_(fixed),
-      stiffness_(assemble_stiffness(mesh, material)),
+      stiffness_(stiffness),
       norm_(stiffness_.norm()),
       chosen_(choose_solver(stiffness_, mesh, fixed, options)) {}
 
@@ -30,10 +34,23 @@ double Statics::free_residual(const Vector& residual) const {
   return largest;
 }
 
-StaticSolution Statics::solve(const Vector& load, const Vector& guess) const {
+StaticSolution Statics::solve(const Vector& load, const Vector& guess,
+                              const Vector& prescribed) const {
   StaticSolution result;
+  result.dimension = stiffness_.dimension();
   result.displacement = guess;
-  chosen_.solver->solve(load, result.displacement);
+  if (prescribed.size() == 0) {
+    chosen_.solver->solve(load, result.displacement);
+  } else {
+    // u = u_p + w: K w = f − K u_p, with w = 0 at held unknowns.
+    Vector held = Vector::Zero(load.size()), right;
+    for (std::size_t i = 0; i < fixed_.size(); ++i)
+      if (fixed_[i]) held[static_cast<Eigen::Index>(i)] = prescribed[static_cast<Eigen::Index>(i)];
+    stiffness_.multiply(held, right);
+    right = load - right;
+    chosen_.solver->solve(right, result.displacement);
+    result.displacement += held;
+  }
   const auto backward_error = [&] {
     stiffness_.multiply(result.displacement, result.reaction);
     result.reaction -= load;

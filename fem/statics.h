@@ -7,29 +7,32 @@
 namespace acopla::fem {
 
 struct StaticSolution {
-  Vector displacement;  ///< u [m], 0 at held unknowns
+  Vector displacement;  ///< u [m], 0 or as prescribed at held unknowns
   /// K u − f [N] at held unknowns, the force of the supports on the body; 0 at free ones.
   Vector reaction;
   /// |K u − f| / (|K| |u| + |f|) at free unknowns: the backward error in the maximum norm.
   double residual = 0;
-  Vec3 total_reaction() const;  ///< [N]
+  int dimension = 3;
+  Vec3 total_reaction() const { return total(reaction, dimension); }  ///< [N]
 };
-
-/// Sum of nodal forces [N].
-Vec3 total(const Vector& nodal);
 
 class Statics {
  public:
   /// Assembles the stiffness and analyses it; prepare() does the rest.
   /// @param mesh, fixed  must outlive this
-  Statics(const Mesh& mesh, const Material& material, const Fixed& fixed,
+  Statics(const Mesh& mesh, const Materials& materials, const Fixed& fixed,
+          const SolverOptions& options, const Formulation& formulation = {});
+  /// The same with a stiffness that is there already and outlives this.
+  Statics(const Mesh& mesh, const BlockMatrix& stiffness, const Fixed& fixed,
           const SolverOptions& options);
 
   /// Factors, or builds the preconditioner.
   void prepare() { chosen_.solver->prepare(); }
   /// @param load   nodal forces f [N], on held unknowns as well: these go straight to the supports
   /// @param guess  displacements to start iterations from; may be empty
-  StaticSolution solve(const Vector& load, const Vector& guess = {}) const;
+  /// @param prescribed  displacements [m] of held unknowns, others are not read; empty: zero
+  StaticSolution solve(const Vector& load, const Vector& guess = {},
+                       const Vector& prescribed = {}) const;
 
   const BlockMatrix& stiffness() const { return stiffness_; }
   const ChosenSolver& solver() const { return chosen_; }
@@ -38,7 +41,8 @@ class Statics {
   double free_residual(const Vector& residual) const;
 
   const Fixed& fixed_;
-  BlockMatrix stiffness_;
+  std::unique_ptr<const BlockMatrix> own_;
+  const BlockMatrix& stiffness_;
   double norm_;
   ChosenSolver chosen_;
 };

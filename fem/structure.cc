@@ -8,7 +8,10 @@
 #include <filesystem>
 
 #include "fem/cholesky.h"
+#include "fem/finite_strain.h"
 #include "fem/interface.h"
+#include "fem/model.h"
+#include "fem/modes.h"
 #include "fem/picture.h"
 #include "fem/statics.h"
 #include "fem/stress.h"
@@ -27,40 +30,35 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-Fixed fixed_unknowns(const Settings& settings, const Mesh& mesh) {
-  const auto fixes = settings.table.table("fix");
-  Fixed fixed(3 * mesh.nodes(), 0);
-  for (const auto& fix : settings.fixes) try {
-      hold(mesh.boundary(fix.group), fix.directions, fixed);
-    } catch (const std::invalid_argument& error) {
-      fixes.fail(fix.group, error.what());
-    }
-  const auto motions = free_motions(mesh, fixed);
-  if (!motions.empty())
-    settings.table.fail("fix", "leaves the structure free to " + motions +
-                                   ". Fix another surface or more directions.");
-  return fixed;
-}
-
-double largest_length(const Vector& nodal) {
-  return std::sqrt(nodal.reshaped(3, nodal.size() / 3).colwise().squaredNorm().maxCoeff());
-}
-
 }  // namespace
 
-struct Structure::Model {
-  Mesh mesh;
-  Fixed fixed;
-  Statics statics;
+struct Structure::Body {
+  Model model;
+  BlockMatrix stiffness;
   Stress stress;
-  Vector weight;
+  std::optional<Statics> statics;
+  std::optional<LargeDisplacements> large;  // of a static structure instead
+  std::optional<MassMatrix> mass;           // of a structure in motion, as the next
+  std::optional<Dynamics> dynamics;
 
-  Model(const Settings& settings, const Vec3& gravity)
-      : mesh(settings.mesh, settings.degree),
-        fixed(fixed_unknowns(settings, mesh)),
-        statics(mesh, settings.material, fixed, settings.solver),
-        stress(mesh, settings.material),
-        weight(weight_loads(mesh, settings.material.density.value_or(0.0), gravity)) {}
+  Body(const Settings& settings, const Vec3& gravity)
+      : model(settings, gravity),
+        stiffness(assemble_stiffness(model.mesh, model.materials, settings.formulation)),
+        stress(model.mesh, model.materials, settings.formulation) {
+    if (settings.formulation.large) {
+      large.emplace(model.mesh, model.materials, model.supports.fixed(), settings.solver,
+                    settings.formulation);
+      return;
+    }
+    if (!settings.motion) {
+      statics.emplace(model.mesh, stiffness, model.supports.fixed(), settings.solver);
+      return;
+    }
+    mass.emplace(
+        assemble_mass(model.mesh, model.materials, settings.formulation, stiffness.pattern()));
+    dynamics.emplace(model.mesh, stiffness, *mass, settings.motion->damping, model.supports,
+                     model.loads, settings.motion->scheme, settings.solver);
+  }
 };
 
 /// A surface that the coupling uses.
@@ -73,7 +71,7 @@ Structure::Structure(Settings settings) : settings_(std::move(settings)) {}
 Structure::~Structure() = default;
 
 protocol::Introduction Structure::introduce() const {
-  return {.solver = "fem", .dimension = 3, .capabilities = {"save"}};
+  return {.solver = "fem", .dimension = settings_.dimension, .capabilities = {"save"}};
 }
 
 namespace {
@@ -82,8 +80,8 @@ void check_fields(const Settings& settings, const protocol::Run::Use& use) {
   const auto refuse = [&](const std::string& field, const std::string& verb,
                           const std::string& known) {
     throw io::UserError(settings.table.location(),
-                        fmt::format("{}.{} cannot {} \"{}\": a static structure {}s {}.",
-                                    settings.name, use.surface, verb, field, verb, known));
+                        fmt::format("{}.{} cannot {} \"{}\": a structure {}s {}.", settings.name,
+                                    use.surface, verb, field, verb, known));
   };
   for (const auto& field : use.receives)
     if (field != "force") refuse(field, "receive", "\"force\"");
@@ -101,27 +99,146 @@ Interface make_interface(const Settings& settings, const Mesh& mesh, const std::
   }
 }
 
+int steps_in(double length, const std::optional<double>& longest) {
+  return longest ? std::max(1, static_cast<int>(std::ceil(length / *longest * (1 - 1e-9)))) : 1;
+}
+
 }  // namespace
 
 std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   const Stopwatch setup;
   run_ = run;
   for (const auto& use : run.uses) check_fields(settings_, use);
-  model_ = std::make_unique<Model>(settings_, Vec3(run.gravity[0], run.gravity[1], run.gravity[2]));
+  if (!run.uses.empty() && settings_.dimension == 2 && settings_.formulation.thickness != 1)
+    settings_.table.fail("thickness",
+                         "must be 1 in a coupling: forces between participants in 2D are those of "
+                         "a metre of depth.");
+  body_ = std::make_unique<Body>(settings_, Vec3(run.gravity[0], run.gravity[1], run.gravity[2]));
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses) {
-    coupled_.push_back({use, make_interface(settings_, model_->mesh, use.surface)});
+    coupled_.push_back({use, make_interface(settings_, body_->model.mesh, use.surface)});
     surfaces.push_back({use.surface, coupled_.back().interface.surface()});
   }
   seconds_.setup = setup.seconds();
   const Stopwatch factor;
-  model_->statics.prepare();
+  if (settings_.frequencies > 0) check_frequencies();
+  find_probes();
+  if (body_->statics)
+    body_->statics->prepare();
+  else if (body_->dynamics)
+    begin_motion();
   seconds_.factor = factor.seconds();
   return surfaces;
 }
 
-Vector Structure::load_of(const std::vector<protocol::Field>& received) const {
-  Vector load = model_->weight;
+void Structure::find_probes() {
+  const auto& mesh = body_->model.mesh;
+  for (const auto& probe : settings_.probes) {
+    Probed probed{probe.name, mesh.nearest_node(probe.at), {}};
+    const double distance = (mesh.points()[probed.node] - probe.at).norm();
+    if (distance > 0.1 * mesh.extent())
+      probe.table.fail(
+          "at", fmt::format("is {:.3g} m away from the nearest node of the mesh.", distance));
+    for (std::size_t c = 0; probe.stress && c < mesh.cells(); ++c) {
+      const auto nodes = mesh.cell(c);
+      if (std::find(nodes.begin(), nodes.end(), probed.node) != nodes.end())
+        probed.cells.push_back(c);
+    }
+    probed_.push_back(std::move(probed));
+  }
+  if (!settings_.reactions) return;
+  // A node of two supports counts for the first that holds it.
+  std::vector<char> counted(mesh.unknowns(), 0);
+  const auto dimension = static_cast<std::size_t>(mesh.dimension());
+  for (const auto& support : settings_.supports) {
+    const auto& name = support.table.name();
+    supported_.push_back({name.substr(name.rfind('.') + 1), {}});
+    for (const auto node : nodes_of(support.part.faces(mesh)))
+      for (std::size_t d = 0; d < dimension; ++d) {
+        const auto unknown = dimension * node + d;
+        if (!support.directions[d] || counted[unknown]++) continue;
+        supported_.back().second.push_back(unknown);
+      }
+  }
+}
+
+void Structure::add_probes(std::vector<std::pair<std::string, double>>& result) const {
+  const int dimension = settings_.dimension;
+  static constexpr const char* voigt[] = {"xx", "yy", "zz", "yz", "xz", "xy"};
+  const auto add_vector = [&](const std::string& name, const Vector& nodal, std::uint32_t node) {
+    const Vec3 value = value_at(nodal, node, dimension);
+    for (int d = 0; d < dimension; ++d) result.emplace_back(name + "xyz"[d], value[d]);
+  };
+  for (const auto& [name, node, cells] : probed_) {
+    add_vector(name + ".displacement.", state_.motion.displacement, node);
+    if (settings_.motion) add_vector(name + ".velocity.", state_.motion.velocity, node);
+    if (cells.empty()) continue;
+    const auto stress = body_->stress.at_node(node, cells, state_.motion.displacement);
+    for (int i = 0; i < 6; ++i)
+      if (dimension == 3 || i < 3 || i == 5)
+        result.emplace_back(name + ".stress." + voigt[i], stress[i]);
+    const Vec3 principals = principal(stress);
+    for (int i = 0; i < 3; ++i)
+      result.emplace_back(fmt::format("{}.principal.{}", name, i + 1), principals[i]);
+    result.emplace_back(name + ".von_mises", von_mises(stress));
+  }
+}
+
+void Structure::add_reactions(const Vector& reaction,
+                              std::vector<std::pair<std::string, double>>& result) const {
+  const auto dimension = static_cast<std::size_t>(settings_.dimension);
+  for (const auto& [name, unknowns] : supported_) {
+    Vec3 sum = Vec3::Zero();
+    for (const auto unknown : unknowns)
+      sum[static_cast<int>(unknown % dimension)] += reaction[static_cast<Eigen::Index>(unknown)];
+    for (std::size_t d = 0; d < dimension; ++d)
+      result.emplace_back(name + ".reaction." + "xyz"[d], sum[static_cast<int>(d)]);
+  }
+}
+
+/// Before hours of a run that they would end in.
+void Structure::check_frequencies() const {
+  const auto output = settings_.table.table("output");
+  const auto& fixed = body_->model.supports.fixed();
+  const auto motions = free_motions(body_->model.mesh, fixed);
+  if (!motions.empty())
+    output.fail("frequencies",
+                "are asked of a structure that is free to " + motions + ". Fix more.");
+  const auto free = static_cast<std::size_t>(std::count(fixed.begin(), fixed.end(), 0));
+  if (4 * settings_.frequencies > free)
+    output.fail(
+        "frequencies",
+        fmt::format("asks for more than a quarter of the {} free unknowns. Refine the mesh.",
+                    free));
+}
+
+/// Equilibrium under weight and the loads at t = 0, or rest; and the factor of the first step.
+void Structure::begin_motion() {
+  const auto& [mesh, materials, supports, loads] = body_->model;
+  auto& motion = state_.motion;
+  motion.displacement = motion.velocity = mesh.zero();
+  supports.place(0, motion.displacement);
+  supports.drive(0, motion.velocity);
+  const auto load = loads.at(0);
+  const bool strained = motion.displacement.squaredNorm() > 0;
+  if (settings_.motion->from_equilibrium && (load.squaredNorm() > 0 || strained)) {
+    require_supported(
+        settings_, mesh, supports.fixed(), "start",
+        "There is no equilibrium under its weight and loads: use start = \"rest\", or fix more.");
+    Statics statics(mesh, body_->stiffness, supports.fixed(), settings_.solver);
+    statics.prepare();
+    motion.displacement = statics.solve(load, {}, motion.displacement).displacement;
+  }
+  const double window = run_.time(run_.window);
+  body_->dynamics->prepare(window / steps_in(window, settings_.motion->step));
+  if (settings_.energy) {
+    state_.passed = body_->dynamics->energy(motion);
+    start_energy_ = state_.passed.kinetic + state_.passed.strain;
+  }
+}
+
+Vector Structure::received_load(const std::vector<protocol::Field>& received) const {
+  Vector load = body_->model.mesh.zero();
   for (const auto& field : received) {
     const auto found = std::find_if(coupled_.begin(), coupled_.end(), [&](const Coupled& c) {
       return c.use.surface == field.surface;
@@ -142,37 +259,98 @@ Vector Structure::load_of(const std::vector<protocol::Field>& received) const {
 
 std::vector<protocol::Field> Structure::fields() const {
   std::vector<protocol::Field> result;
+  const auto& [displacement, velocity, acceleration, force, time] = state_.motion;
   for (const auto& [use, interface] : coupled_)
     for (const auto& name : use.sends) {
-      const bool moves = name == "displacement";
-      auto values = moves ? interface.values(state_.displacement)
-                          : std::vector<Vec3>(interface.nodes().size(), Vec3::Zero());
+      const auto& nodal = name == "displacement" ? displacement : velocity;
+      auto values = nodal.size() > 0 ? interface.values(nodal)
+                                     : std::vector<Vec3>(interface.nodes().size(), Vec3::Zero());
       result.push_back({use.surface, name, std::move(values)});
     }
   return result;
 }
 
+Structure::Response Structure::equilibrate(const protocol::Window& window, const Vector& force) {
+  const auto& [mesh, materials, supports, loads] = body_->model;
+  const double end = window.end_time();
+  const Vector load = force + loads.at(end);
+  Vector prescribed;
+  if (supports.moving()) {
+    prescribed = mesh.zero();
+    supports.place(end, prescribed);
+  }
+  if (body_->large) {
+    auto& motion = state_.motion;
+    if (motion.displacement.size() > 0)
+      body_->large->restart_from(motion.displacement, motion.force);
+    const auto before = body_->large->iterations();
+    auto solution = body_->large->solve(load, prescribed);
+    worst_residual_ = std::max(worst_residual_, solution.residual);
+    motion.displacement = std::move(solution.displacement);
+    motion.force = load;
+    return {std::move(solution.reaction), total(load, mesh.dimension()),
+            body_->large->iterations() - before};
+  }
+  auto solution = body_->statics->solve(load, state_.motion.displacement, prescribed);
+  worst_residual_ = std::max(worst_residual_, solution.residual);
+  state_.motion.displacement = std::move(solution.displacement);
+  return {std::move(solution.reaction), total(load, mesh.dimension()), 1};
+}
+
+Structure::Response Structure::move(const protocol::Window& window, const Vector& force) {
+  const auto& [mesh, materials, supports, loads] = body_->model;
+  const int steps = steps_in(window.length, settings_.motion->step);
+  auto& passed = state_.passed;
+  state_.motion.time = window.start_time;
+  Energy energy;
+  Response response{
+      body_->dynamics->advance(state_.motion, force, window.length, steps,
+                               settings_.energy ? &energy : nullptr),
+      total(force + loads.mean(window.start_time, window.end_time()), mesh.dimension()),
+      static_cast<std::uint64_t>(steps)};
+  passed = {energy.kinetic, energy.strain, passed.work + energy.work,
+            passed.support_work + energy.support_work, passed.damping + energy.damping};
+  return response;
+}
+
 protocol::Advance Structure::advance(const protocol::Window& window,
                                      const std::vector<protocol::Field>& received) {
   if (state_.due) draw();
-  const auto load = load_of(received);
+  const auto force = received_load(received);
   const Stopwatch solve;
-  const auto solution = model_->statics.solve(load, state_.displacement);
-  const auto peak = model_->stress.peak(solution.displacement);
+  const auto response = body_->dynamics ? move(window, force) : equilibrate(window, force);
+  state_.motion.time = window.end_time();
+  state_.due = is_due(window);
+  state_.drawn = false;
+  protocol::Advance result{fields(), quantities(response), response.steps};
   seconds_.solve += solve.seconds();
-  worst_residual_ = std::max(worst_residual_, solution.residual);
-  state_ = {solution.displacement, window.end_time(), is_due(window), false};
+  return result;
+}
 
-  protocol::Advance result;
-  result.fields = fields();
-  const Vec3 reaction = solution.total_reaction(), sum = total(load);
-  for (int d = 0; d < 3; ++d)
-    result.quantities.emplace_back(std::string("reaction.") + "xyz"[d], reaction[d]);
-  for (int d = 0; d < 3; ++d)
-    result.quantities.emplace_back(std::string("load.") + "xyz"[d], sum[d]);
-  result.quantities.emplace_back("displacement.max", largest_length(solution.displacement));
-  result.quantities.emplace_back("von_mises.max", peak.value);
-  result.steps = 1;
+std::vector<std::pair<std::string, double>> Structure::quantities(const Response& response) const {
+  const int dimension = settings_.dimension;
+  std::vector<std::pair<std::string, double>> result;
+  const Vec3 reaction = total(response.reaction, dimension);
+  for (int d = 0; d < dimension; ++d)
+    result.emplace_back(std::string("reaction.") + "xyz"[d], reaction[d]);
+  for (int d = 0; d < dimension; ++d)
+    result.emplace_back(std::string("load.") + "xyz"[d], response.load[d]);
+  result.emplace_back("displacement.max", largest_length(state_.motion.displacement, dimension));
+  if (settings_.motion)
+    result.emplace_back("velocity.max", largest_length(state_.motion.velocity, dimension));
+  if (settings_.von_mises)
+    result.emplace_back("von_mises.max", body_->stress.peak(state_.motion.displacement).value);
+  add_reactions(response.reaction, result);
+  add_probes(result);
+  if (settings_.energy) {
+    const auto& [kinetic, strain, work, support_work, damping] = state_.passed;
+    result.emplace_back("energy.kinetic", kinetic);
+    result.emplace_back("energy.strain", strain);
+    result.emplace_back("energy.work", work + support_work);
+    result.emplace_back("energy.damping", damping);
+    result.emplace_back("energy.error",
+                        kinetic + strain - start_energy_ - work - support_work + damping);
+  }
   return result;
 }
 
@@ -192,10 +370,11 @@ void Structure::draw() {
   const auto folder = std::filesystem::path(run_.results);
   std::filesystem::create_directories(folder);
   const auto file = fmt::format("{}_{:04d}.vtu", settings_.name, ++pictures_);
-  write_picture((folder / file).string(), model_->mesh, state_.displacement,
-                model_->stress.nodal_von_mises(state_.displacement));
+  const auto& displacement = state_.motion.displacement;
+  write_picture((folder / file).string(), body_->model.mesh, displacement,
+                body_->stress.nodal_von_mises(displacement));
   if (!series_) series_.emplace((folder / (settings_.name + ".pvd")).string());
-  series_->add(state_.time, (folder / file).string());
+  series_->add(state_.motion.time, (folder / file).string());
 }
 
 // A picture of a window is drawn when the next begins, so that a rejected iteration leaves none.
@@ -208,13 +387,32 @@ void Structure::restore() { state_ = saved_; }
 
 std::vector<std::pair<std::string, double>> Structure::finish() {
   if (!state_.drawn) draw();
-  const auto& statics = model_->statics;
-  return {{"seconds.setup", seconds_.setup},
-          {"seconds.factor", seconds_.factor},
-          {"seconds.solve", seconds_.solve},
-          {"dofs", static_cast<double>(3 * model_->mesh.nodes())},
-          {"factor.bytes", statics.solver().factor_bytes},
-          {"residual", worst_residual_}};
+  std::vector<std::pair<std::string, double>> result{
+      {"seconds.setup", seconds_.setup},
+      {"seconds.factor", seconds_.factor},
+      {"seconds.solve", seconds_.solve},
+      {"dofs", static_cast<double>(body_->model.mesh.unknowns())}};
+  if (body_->statics) result.emplace_back("factor.bytes", body_->statics->solver().factor_bytes);
+  if (body_->dynamics) result.emplace_back("factor.bytes", body_->dynamics->solver().factor_bytes);
+  if (body_->dynamics)
+    result.emplace_back("factorisations", static_cast<double>(body_->dynamics->factorisations()));
+  else
+    result.emplace_back("residual", worst_residual_);
+  for (auto& frequency : frequencies()) result.push_back(std::move(frequency));
+  return result;
+}
+
+std::vector<std::pair<std::string, double>> Structure::frequencies() const {
+  std::vector<std::pair<std::string, double>> result;
+  if (settings_.frequencies == 0) return result;
+  const auto& [mesh, materials, supports, loads] = body_->model;
+  const auto mass =
+      assemble_mass(mesh, materials, settings_.formulation, body_->stiffness.pattern());
+  const auto modes = natural_modes(mesh, body_->stiffness, mass, supports.fixed(),
+                                   settings_.frequencies, settings_.solver);
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    result.emplace_back(fmt::format("frequency.{}", m + 1), modes[m].frequency);
+  return result;
 }
 
 namespace {
@@ -229,39 +427,83 @@ constexpr double solve_bytes_a_second = 3.5e9;
 std::string surfaces_of(const Mesh& mesh) {
   std::string text;
   for (const auto& group : mesh.groups())
-    if (group.dimension == 2) text += (text.empty() ? "" : ", ") + group.name;
+    if (group.dimension == mesh.dimension() - 1) text += (text.empty() ? "" : ", ") + group.name;
   return text.empty() ? "none" : text;
+}
+
+const char* cells_of(const Mesh& mesh) {
+  if (mesh.dimension() == 2) return mesh.element().simplex ? "triangles" : "quadrilaterals";
+  return mesh.element().simplex ? "tetrahedra" : "hexahedra";
+}
+
+std::string kinematics_of(const Settings& settings) {
+  if (settings.dimension == 3) return "";
+  return fmt::format(" in plane {}", settings.formulation.plane == Formulation::Plane::strain
+                                         ? "strain"
+                                         : "stress");
+}
+
+std::string scheme_of(const Settings::Motion& motion) {
+  const auto& scheme = motion.scheme;
+  return scheme.generalised
+             ? fmt::format("generalised-α, β = {:.4g}, γ = {:.4g}, α_m = {:.4g}, α_f = {:.4g}",
+                           scheme.beta, scheme.gamma, scheme.alpha_m, scheme.alpha_f)
+             : fmt::format("Newmark, β = {:.4g}, γ = {:.4g}", scheme.beta, scheme.gamma);
+}
+
+/// A mesh drawn in millimetres is a thousand times too large.
+std::string doubtful_size(const Mesh& mesh) {
+  if (mesh.extent() < 1000) return {};
+  return fmt::format("the mesh is {:.4g} m large. Lengths are metres: was it drawn in millimetres?",
+                     mesh.extent());
+}
+
+double mass_of(const Settings& settings, const Model& model) {
+  double mass = 0;
+  const Vector unit =
+      weight_loads(model.mesh, model.materials, Vec3(1, 0, 0), settings.formulation);
+  mass = total(unit, model.mesh.dimension())[0];
+  return mass;
 }
 
 }  // namespace
 
 std::string explain(const Settings& settings) {
-  const Mesh mesh(settings.mesh, settings.degree);
-  const auto fixed = fixed_unknowns(settings, mesh);
-  const Statics statics(mesh, settings.material, fixed, settings.solver);
-  const auto& solver = statics.solver();
-  const auto held = std::count(fixed.begin(), fixed.end(), 1);
+  const Model model(settings, Vec3::Zero());
+  const auto& mesh = model.mesh;
+  const auto& fixed = model.supports.fixed();
+  const auto stiffness = assemble_stiffness(mesh, model.materials, settings.formulation);
+  // A matrix in motion has the same pattern as the stiffness, and so the same factor.
+  const auto solver = choose_solver(stiffness, mesh, fixed, settings.solver);
+  const double mass = mass_of(settings, model);
   std::string text = fmt::format(
-      "{}: static linear elasticity, {} {} of degree {}, {} nodes, {} unknowns ({} held)\n"
-      "  surfaces of the mesh: {}\n  volume {:.6g} m3, {}\n",
-      settings.name, mesh.cells(), mesh.element().simplex ? "tetrahedra" : "hexahedra",
-      settings.degree, mesh.nodes(), 3 * mesh.nodes(), held, surfaces_of(mesh), mesh.volume(),
-      settings.material.density
-          ? fmt::format("mass {:.6g} kg", mesh.volume() * *settings.material.density)
-          : "no density, so no weight");
+      "{}: {} {} elasticity{}, {} {} of degree {}, {} nodes, {} unknowns ({} held)\n"
+      "  surfaces of the mesh: {}\n  {} {:.6g} {}, {}\n",
+      settings.name, settings.motion ? "dynamic" : "static",
+      settings.formulation.large ? "geometrically nonlinear" : "linear", kinematics_of(settings),
+      mesh.cells(), cells_of(mesh), settings.degree, mesh.nodes(), mesh.unknowns(),
+      std::count(fixed.begin(), fixed.end(), 1), surfaces_of(mesh),
+      mesh.dimension() == 2 ? "area" : "volume", mesh.volume(), mesh.dimension() == 2 ? "m2" : "m3",
+      mass > 0 ? fmt::format("mass {:.6g} kg", mass) : "no density, so no weight");
+  if (const auto doubt = doubtful_size(mesh); !doubt.empty()) text += "  warning: " + doubt + "\n";
+  if (settings.motion) text += fmt::format("  time integration: {}\n", scheme_of(*settings.motion));
   text += fmt::format("  linear solver: {}, because {}\n",
-                      solver.direct ? "direct (Cholesky, factored once)"
+                      solver.direct ? settings.formulation.large
+                                          ? "direct (Cholesky, factored every iteration)"
+                                          : "direct (Cholesky, factored once)"
                                     : "conjugate gradients with algebraic multigrid",
                       solver.why);
-  const auto stiffness_bytes = static_cast<double>(statics.stiffness().blocks()) * 76;
-  // The direct solver hands CHOLMOD the lower triangle, in a form twice as large.
+  // The direct solver hands CHOLMOD the lower triangle, in a form twice as large; motion adds the
+  // effective matrix and the mass.
+  const double matrices = settings.motion ? 3.2 : 2;
   const double memory =
-      2 * stiffness_bytes + (solver.direct ? solver.factor_bytes : stiffness_bytes);
+      matrices * stiffness.bytes() + (solver.direct ? solver.factor_bytes : stiffness.bytes());
   text += fmt::format("  memory: about {:.2g} GiB\n", memory / (1ull << 30) + 0.2);
   if (solver.direct)
-    text += fmt::format("  time: about {:.2g} s to factor, {:.2g} s a window\n",
+    text += fmt::format("  time: about {:.2g} s to factor, {:.2g} s a {}\n",
                         solver.flops / (factor_share * blas_rate()),
-                        solver.factor_bytes / solve_bytes_a_second);
+                        solver.factor_bytes / solve_bytes_a_second,
+                        settings.motion ? "step" : "window");
   return text;
 }
 

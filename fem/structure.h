@@ -12,10 +12,13 @@
 
 namespace acopla::fem {
 
-/// An elastic structure in static equilibrium with the forces of each window. Receives "force",
-/// sends "displacement" and "velocity" (zero) on physical surfaces of its mesh. Reports reaction.x,
-/// .y, .z (force of the supports on the structure), load.x, .y, .z (received forces and weight)
-/// [N], displacement.max [m] and von_mises.max [Pa].
+/// An elastic structure under the mean forces of each window, its weight and its own loads: in
+/// static equilibrium with them, or in motion. Receives "force", sends "displacement" and
+/// "velocity" (zero of a static one) on physical surfaces of its mesh, lines in 2D. Reports
+/// reaction.x, .y, .z (force of the supports on the structure), load.x, .y, .z (received forces,
+/// weight and loads) [N], displacement.max [m], von_mises.max [Pa], and of a structure in motion
+/// velocity.max [m/s] and, when asked for, energy.kinetic, .strain, .work, .damping and .error [J].
+/// Reactions and loads of a structure in motion are means over the window.
 class Structure : public protocol::Participant {
  public:
   explicit Structure(Settings settings);
@@ -30,19 +33,41 @@ class Structure : public protocol::Participant {
   void restore() override;
 
  private:
-  struct Model;
+  struct Body;
   struct Coupled;
-  Vector load_of(const std::vector<protocol::Field>& received) const;
+  /// What a window gave, beside the motion.
+  struct Response {
+    Vector reaction;
+    Vec3 load = Vec3::Zero();
+    std::uint64_t steps = 1;
+  };
+  Vector received_load(const std::vector<protocol::Field>& received) const;
+  Response equilibrate(const protocol::Window& window, const Vector& force);
+  Response move(const protocol::Window& window, const Vector& force);
+  void begin_motion();
+  void check_frequencies() const;
+  std::vector<std::pair<std::string, double>> frequencies() const;
+  void find_probes();
+  void add_probes(std::vector<std::pair<std::string, double>>& result) const;
+  void add_reactions(const Vector& reaction,
+                     std::vector<std::pair<std::string, double>>& result) const;
+  std::vector<std::pair<std::string, double>> quantities(const Response& response) const;
   std::vector<protocol::Field> fields() const;
   bool is_due(const protocol::Window& window) const;
   void draw();
 
   /// What a rejected iteration must undo.
   struct State {
-    Vector displacement;
-    double time = 0;
+    Motion motion;
+    Energy passed;     ///< work and losses since the start, energies now
     bool due = false;  ///< a picture of it is wanted
     bool drawn = true;
+  };
+  /// A node that is reported, and the cells that meet there where its stress is.
+  struct Probed {
+    std::string name;
+    std::uint32_t node = 0;
+    std::vector<std::size_t> cells;
   };
   struct Seconds {
     double setup = 0, factor = 0, solve = 0;
@@ -50,9 +75,13 @@ class Structure : public protocol::Participant {
 
   Settings settings_;
   protocol::Run run_;
-  std::unique_ptr<Model> model_;
+  std::unique_ptr<Body> body_;
   std::vector<Coupled> coupled_;
+  std::vector<Probed> probed_;
+  std::vector<std::pair<std::string, std::vector<std::size_t>>>
+      supported_;  // unknowns of each support, when asked for
   State state_, saved_;
+  double start_energy_ = 0;
   Seconds seconds_;
   double worst_residual_ = 0;
   int pictures_ = 0;

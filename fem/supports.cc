@@ -4,8 +4,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 
 namespace acopla::fem {
 namespace {
@@ -55,7 +57,10 @@ std::vector<Part> measure_parts(const Mesh& mesh, const std::vector<std::size_t>
     auto& part = parts[part_of[n]];
     const Vec3 arm = (mesh.points()[n] - part.centre()) / part.size();
     for (int d = 0; d < 3; ++d) {
-      if (!fixed[3 * n + static_cast<std::size_t>(d)]) continue;
+      // A body in 2D does not leave its plane: as if held along z.
+      if (d < mesh.dimension() &&
+          !fixed[static_cast<std::size_t>(mesh.dimension()) * n + static_cast<std::size_t>(d)])
+        continue;
       Mode row;
       row.head<3>() = arm.cross(Vec3(Vec3::Unit(d)));  // e_d · (ω × arm) = ω · (arm × e_d)
       row.tail<3>() = Vec3::Unit(d);
@@ -112,11 +117,90 @@ std::string describe(const Mode& mode, const Part& part) {
 }  // namespace
 
 void hold(const std::vector<BoundaryFace>& faces, const std::array<bool, 3>& directions,
-          Fixed& fixed) {
+          Fixed& fixed, int dimension) {
+  const auto count = static_cast<std::size_t>(dimension);
   for (const auto& face : faces)
     for (const auto node : face.used())
-      for (std::size_t d = 0; d < 3; ++d)
-        if (directions[d]) fixed[3 * std::size_t{node} + d] = 1;
+      for (std::size_t d = 0; d < count; ++d)
+        if (directions[d]) fixed[count * std::size_t{node} + d] = 1;
+}
+
+void Supports::claim(const Mesh& mesh, std::uint32_t node, int direction) {
+  const auto unknown =
+      static_cast<std::size_t>(dimension_) * node + static_cast<std::size_t>(direction);
+  const auto index = std::ssize(sources_) - 1;
+  const auto& now = sources_.back();
+  if (owner_[unknown] >= 0 && owner_[unknown] != index) {
+    const auto& before = sources_[static_cast<std::size_t>(owner_[unknown])];
+    const auto stays = [&](const Source& source) {
+      return !source.moves || source.value[direction] == 0;
+    };
+    const bool same =
+        (stays(now) && stays(before)) ||
+        (now.moves && before.moves && now.value[direction] == before.value[direction] &&
+         now.history.velocities == before.history.velocities &&
+         now.history.amplitude.points() == before.history.amplitude.points());
+    if (same) return;
+    const auto& p = mesh.points()[node];
+    throw std::invalid_argument(
+        fmt::format("contradicts {}: both prescribe the displacement along {} at ({:.4g}, {:.4g}, "
+                    "{:.4g}). Leave that direction out of "
+                    "one of them (`directions`), or choose parts that share no node.",
+                    before.name, "xyz"[direction], p[0], p[1], p[2]));
+  }
+  owner_[unknown] = static_cast<std::int32_t>(index);
+  if (now.moves && now.value[direction] != 0)
+    moved_.push_back({unknown, now.value[direction], sources_.size() - 1});
+  fixed_[unknown] = 1;
+}
+
+void Supports::hold(const std::string& name, const Mesh& mesh,
+                    const std::vector<std::uint32_t>& nodes,
+                    const std::array<bool, 3>& directions) {
+  sources_.push_back({name, false, Vec3::Zero(), {}});
+  for (const auto node : nodes)
+    for (int d = 0; d < dimension_; ++d)
+      if (directions[static_cast<std::size_t>(d)]) claim(mesh, node, d);
+}
+
+void Supports::move(const std::string& name, const Mesh& mesh,
+                    const std::vector<std::uint32_t>& nodes, const std::array<bool, 3>& directions,
+                    const Vec3& value, const MotionHistory& history) {
+  sources_.push_back({name, true, value, history});
+  for (const auto node : nodes)
+    for (int d = 0; d < dimension_; ++d)
+      if (directions[static_cast<std::size_t>(d)]) claim(mesh, node, d);
+}
+
+std::vector<std::uint32_t> Supports::nodes() const {
+  std::vector<std::uint32_t> result;
+  const auto count = static_cast<std::size_t>(dimension_);
+  for (std::size_t n = 0; n < fixed_.size() / count; ++n)
+    if (std::any_of(fixed_.begin() + static_cast<std::ptrdiff_t>(count * n),
+                    fixed_.begin() + static_cast<std::ptrdiff_t>(count * (n + 1)),
+                    [](char mark) { return mark != 0; }))
+      result.push_back(static_cast<std::uint32_t>(n));
+  return result;
+}
+
+template <class Value>
+void Supports::write(const Value& value_of, Vector& nodal) const {
+  for (std::size_t i = 0; i < fixed_.size(); ++i)
+    if (fixed_[i]) nodal[static_cast<Eigen::Index>(i)] = 0;
+  for (const auto& [unknown, value, source] : moved_)
+    nodal[static_cast<Eigen::Index>(unknown)] = value * value_of(sources_[source].history);
+}
+
+void Supports::place(double time, Vector& displacement) const {
+  write([&](const MotionHistory& history) { return history.displacement(time); }, displacement);
+}
+
+void Supports::drive(double time, Vector& velocity) const {
+  write([&](const MotionHistory& history) { return history.velocity(time); }, velocity);
+}
+
+void Supports::accelerate(double time, Vector& acceleration) const {
+  write([&](const MotionHistory& history) { return history.acceleration(time); }, acceleration);
 }
 
 std::string free_motions(const Mesh& mesh, const Fixed& fixed) {

@@ -55,10 +55,36 @@ def whole_case(example):
     return HEAD.format(**words) + own + "".join(PARTS[name].format(**words) for name in lacking)
 
 
+def whole_structure(example):
+    """The example and what it lacks; its parts are sides of a block."""
+    names = re.findall(r"^\[structure\.(?:fix|load|move)\.(\w+)\]", example, re.M)
+    sides = ["y0", "z1", "z0", "x1"]
+    for name, side in zip(names, sides):
+        example = example.replace(f".{name}]", f".{side}]")
+    head = "" if "[structure]" in example else "[structure]\nmesh = { bar = { size = [1, 1, 1], cells = [2, 2, 2] } }\n"
+    tail = "" if "fix" in example else "[structure.fix.x0]\n"
+    whole = head + example + "[structure.material]\nyoung = 1e9\npoisson = 0.3\n" + tail
+    return "dimension = 3\nend = 1\n" + whole.replace("[structure]\n", '[structure]\nsolver = "fem"\n')
+
+
 class Guide(unittest.TestCase):
     def check(self, case, *options):
         done = subprocess.run([BIN / "acopla-dem", case, *(options or ["--check"])], capture_output=True, text=True, timeout=120)
         self.assertEqual(done.returncode, 0, f"{done.stderr}\n{pathlib.Path(case).read_text()}")
+
+    @unittest.skipUnless((BIN / "acopla-fem").exists(), "built without deal.II")
+    def test_examples_of_structures(self):
+        examples = [e for e in re.findall(r"```toml\n(.*?)```", (ROOT / "docs/guide.md").read_text(), re.S) if "[structure" in e]
+        self.assertGreater(len(examples), 1)
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "earthquake.csv").write_text("0, 0\n1, 0.1\n")
+            for number, example in enumerate(examples):
+                with self.subTest(example=example):
+                    case = folder / f"structure{number}.toml"
+                    case.write_text(whole_structure(example))
+                    done = subprocess.run([BIN / "acopla-fem", case, "--explain"], capture_output=True, text=True, timeout=120)
+                    self.assertEqual(done.returncode, 0, f"{done.stderr}\n{case.read_text()}")
 
     def test_examples(self):
         examples = re.findall(r"```toml\n(.*?)```", (ROOT / "docs/guide.md").read_text(), re.S)
@@ -69,6 +95,8 @@ class Guide(unittest.TestCase):
             settled.write_text(whole_case("[grains.output]\ncheckpoint = true\n"))
             self.check(settled, "--results", str(folder / "settled"))  # what start_from names
             for number, example in enumerate(examples):
+                if "[structure" in example:
+                    continue  # below
                 with self.subTest(example=example):
                     case = folder / f"example{number}.toml"
                     case.write_text(whole_case(example))

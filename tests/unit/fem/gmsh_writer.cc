@@ -27,9 +27,11 @@ class Writer {
 
   std::string text() const {
     auto result =
-        fmt::format("$MeshFormat\n{} 0 8\n$EndMeshFormat\n$PhysicalNames\n8\n", block_.version);
+        fmt::format("$MeshFormat\n{} 0 8\n$EndMeshFormat\n$PhysicalNames\n11\n", block_.version);
     for (int s = 0; s < 6; ++s) result += fmt::format("2 {} \"{}\"\n", s + 1, sides[s]);
-    result += "3 7 \"solid\"\n1 8 \"edge\"\n$EndPhysicalNames\n";
+    result +=
+        "3 7 \"solid\"\n1 8 \"edge\"\n1 9 \"ridge\"\n0 10 \"corner\"\n3 11 "
+        "\"other\"\n$EndPhysicalNames\n";
     return result + (block_.version < 4 ? body_2() : body_4());
   }
 
@@ -81,10 +83,29 @@ class Writer {
     p = block_.move(p);
     return fmt::format("{:.17g} {:.17g} {:.17g}\n", p[0], p[1], p[2]);
   }
+  /// Lines of the edge at the top of x and z.
+  std::vector<Nodes> ridge() const {
+    const auto [nx, ny, nz] = block_.cells;
+    std::vector<Nodes> lines;
+    for (int j = 0; j < ny; ++j) lines.push_back({node(nx, j, nz), node(nx, j + 1, nz)});
+    return lines;
+  }
+  /// Cells of "solid", or of "other".
+  std::vector<Nodes> cells_of(bool other) const {
+    std::vector<Nodes> result;
+    const auto half = [&](const Nodes& cell) {
+      int sum = 0;
+      for (const int n : cell) sum += indices(n)[0];
+      return 2 * sum > block_.cells[0] * static_cast<int>(cell.size());
+    };
+    for (const auto& cell : cells_)
+      if ((block_.two_solids && half(cell)) == other) result.push_back(cell);
+    return result;
+  }
   int cell_type() const { return block_.tetrahedra ? 4 : 5; }
   int face_type() const { return block_.tetrahedra ? 2 : 3; }
   std::size_t element_count() const {
-    std::size_t count = cells_.size();
+    std::size_t count = cells_.size() + ridge().size() + 1;
     for (const auto& faces : faces_) count += faces.size();
     return count;
   }
@@ -99,18 +120,21 @@ class Writer {
     };
     for (int s = 0; s < 6; ++s)
       for (const auto& face : faces_[static_cast<std::size_t>(s)]) add(face_type(), s + 1, face);
-    for (const auto& cell : cells_) add(cell_type(), 7, cell);
+    add(15, 10, {node_count()});
+    for (const auto& line : ridge()) add(1, 9, line);
+    for (const auto& cell : cells_of(false)) add(cell_type(), 7, cell);
+    for (const auto& cell : cells_of(true)) add(cell_type(), 11, cell);
     return text + "$EndElements\n";
   }
 
   std::string body_4() const {
-    std::string text = "$Entities\n0 0 6 1\n";
+    std::string text = "$Entities\n1 1 6 2\n1 0 0 0 1 10\n1 0 0 0 1 1 1 1 9 0\n";
     for (int s = 1; s <= 6; ++s) text += fmt::format("{} 0 0 0 1 1 1 1 {} 0\n", s, s);
-    text += "1 0 0 0 1 1 1 1 7 0\n$EndEntities\n";
+    text += "1 0 0 0 1 1 1 1 7 0\n2 0 0 0 1 1 1 1 11 0\n$EndEntities\n";
     text += fmt::format("$Nodes\n1 {0} 1 {0}\n3 1 0 {0}\n", node_count());
     for (int n = 1; n <= node_count(); ++n) text += fmt::format("{}\n", n);
     for (int n = 1; n <= node_count(); ++n) text += coordinates(n);
-    text += fmt::format("$EndNodes\n$Elements\n7 {0} 1 {0}\n", element_count());
+    text += fmt::format("$EndNodes\n$Elements\n10 {0} 1 {0}\n", element_count());
     int next = 1;
     const auto add = [&](int dimension, int tag, int type, const std::vector<Nodes>& elements) {
       text += fmt::format("{} {} {} {}\n", dimension, tag, type, elements.size());
@@ -118,7 +142,10 @@ class Writer {
         text += fmt::format("{} {}\n", next++, fmt::join(nodes, " "));
     };
     for (int s = 0; s < 6; ++s) add(2, s + 1, face_type(), faces_[static_cast<std::size_t>(s)]);
-    add(3, 1, cell_type(), cells_);
+    add(0, 1, 15, {{node_count()}});
+    add(1, 1, 1, ridge());
+    add(3, 1, cell_type(), cells_of(false));
+    add(3, 2, cell_type(), cells_of(true));
     return text + "$EndElements\n";
   }
 

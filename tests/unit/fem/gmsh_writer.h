@@ -16,12 +16,14 @@ struct Block {
   std::array<int, 3> cells{2, 2, 2};  ///< along x, y, z
   bool tetrahedra = false;            ///< six a hexahedron
   double version = 4.1;               ///< of the format, 2.2 or 4.1
+  bool two_solids = false;  ///< the cells of the upper half along x are "other" instead of "solid"
   /// Moves the nodes; identity unless given.
   std::function<Vec3(const Vec3&)> move = [](const Vec3& p) { return p; };
 };
 
 /// Writes the block to a file in the test's folder. Its sides are the physical surfaces "x0", "x1",
-/// "y0", …, "z1"; the volume is "solid", and "edge" is a physical curve without elements.
+/// "y0", …, "z1"; the volume is "solid". "edge" is a physical curve without elements, "ridge" the
+/// edge x = z = top, and "corner" the point of the largest x, y, z.
 /// @return the path
 std::string write_block(const std::string& name, const Block& block = {});
 

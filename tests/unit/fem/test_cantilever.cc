@@ -14,7 +14,7 @@ double deflection(const Vec3& size, const std::array<int, 3>& cells, int degree,
   const Mesh mesh(write_block("bar", {.size = size, .cells = cells}), degree);
   Fixed fixed(3 * mesh.nodes(), 0);
   hold(mesh.boundary("x0"), {true, true, true}, fixed);
-  Statics statics(mesh, {young, 0.0, {}}, fixed, {});
+  Statics statics(mesh, Material{young, 0.0, {}}, fixed, {});
   statics.prepare();
   const Interface end(mesh, "x1");
   Vector load = Vector::Zero(3 * static_cast<int>(mesh.nodes()));

@@ -40,7 +40,7 @@ TEST_P(Cells, FillTheBlockWithTheNodesOfTheirOrder) {
 
 TEST(Groups, AreReadWithTheirDimensions) {
   const auto groups = read_physical_groups(write_block("block"));
-  ASSERT_EQ(groups.size(), 8u);
+  ASSERT_EQ(groups.size(), 11u);
   EXPECT_EQ(groups[1].name, "x1");
   EXPECT_EQ(groups[1].dimension, 2);
   EXPECT_EQ(groups[1].id, 2);

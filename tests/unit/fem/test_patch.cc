@@ -28,7 +28,7 @@ INSTANTIATE_TEST_SUITE_P(Cells, Patch, all_kinds(), name_of_kind);
 // the round-off of sums of terms of size |K| |u|.
 TEST_P(Patch, LinearDisplacementLoadsNoNodeInside) {
   const auto patch = mesh();
-  const auto stiffness = assemble_stiffness(patch, {young, poisson, {}});
+  const auto stiffness = assemble_stiffness(patch, Material{young, poisson, {}});
   Eigen::Matrix3d slope;
   slope << 1e-3, 2e-3, -1e-3, 4e-4, -2e-3, 3e-4, 5e-4, 6e-4, 7e-4;
   Vector u(3 * static_cast<int>(patch.nodes())), force;
@@ -92,6 +92,8 @@ TEST(VonMises, OfUniaxialAndShearAndHydrostaticStress) {
   EXPECT_DOUBLE_EQ(von_mises(uniaxial), 3);
   EXPECT_DOUBLE_EQ(von_mises(shear), 2 * std::sqrt(3));
   EXPECT_DOUBLE_EQ(von_mises(hydrostatic), 0);
+  EXPECT_LT((principal(uniaxial) - Vec3(0, 0, -3)).norm(), 1e-15);
+  EXPECT_LT((principal(shear) - Vec3(2, 0, -2)).norm(), 1e-14);
 }
 
 }  // namespace

@@ -40,17 +40,21 @@ TEST_F(CaseTable, HasDefaults) {
   EXPECT_EQ(settings.degree, 2);
   EXPECT_EQ(settings.solver.kind, SolverOptions::Kind::automatic);
   EXPECT_EQ(settings.solver.memory_limit, 4.0 * (1ull << 30));
-  EXPECT_FALSE(settings.material.density.has_value());
+  ASSERT_EQ(settings.materials.size(), 1u);
+  EXPECT_FALSE(settings.materials[0].material.density.has_value());
+  EXPECT_FALSE(settings.motion.has_value());
+  EXPECT_TRUE(settings.loads.empty());
   EXPECT_TRUE(settings.vtu);
   EXPECT_FALSE(settings.every.has_value());
-  ASSERT_EQ(settings.fixes.size(), 1u);
-  EXPECT_EQ(settings.fixes[0].group, "z0");
-  EXPECT_EQ(settings.fixes[0].directions, (std::array{true, true, true}));
+  ASSERT_EQ(settings.supports.size(), 1u);
+  EXPECT_EQ(settings.supports[0].part.groups, std::vector<std::string>{"z0"});
+  EXPECT_FALSE(settings.supports[0].moves);
+  EXPECT_EQ(settings.supports[0].directions, (std::array{true, true, true}));
 }
 
 TEST_F(CaseTable, ReadsDirections) {
   const auto settings = read(with("[structure.fix.z0]\ndirections = [\"x\", \"z\"]\n"));
-  EXPECT_EQ(settings.fixes[0].directions, (std::array{true, false, true}));
+  EXPECT_EQ(settings.supports[0].directions, (std::array{true, false, true}));
   expect(with("[structure.fix.z0]\ndirections = [\"w\"]\n"),
          {"case.toml:9:", "structure.fix.z0.directions has \"w\""});
   expect(with("[structure.fix.z0]\ndirections = []\n"), {"is empty"});
@@ -78,14 +82,6 @@ TEST_F(CaseTable, RefusesMaterialsThatCannotBe) {
   expect("dimension = 3\n[structure]\nmesh = \"" + mesh_ +
              "\"\n[structure.material]\nyoung = 0\npoisson = 0.2\n[structure.fix.z0]\n",
          {"structure.material.young"});
-}
-
-TEST_F(CaseTable, SaysWhatIsNotThereYet) {
-  const auto dynamic =
-      "dimension = 3\n[structure]\nmesh = \"" + mesh_ + "\"\nanalysis = \"dynamic\"\n";
-  expect(dynamic, {"case.toml:4:", "structure.analysis", "supports \"static\""});
-  expect("dimension = 2\n[structure]\nmesh = \"" + mesh_ + "\"\n",
-         {"case.toml:1:", "dimension = 2", "supports 3"});
 }
 
 TEST_F(CaseTable, RefusesAMeshFileThatIsNotThere) {

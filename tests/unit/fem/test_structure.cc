@@ -103,6 +103,68 @@ TEST_F(AStructure, LeftFreeToMoveIsRefusedWithTheMotionsNamed) {
   }
 }
 
+// On request: a bar stretched along x between a fixed and a moved end. Stress σ = E ε of ν = 0,
+// nothing else; reactions at the two ends are opposite.
+TEST_F(AStructure, ReportsPointsAndTheReactionOfEachSupport) {
+  const auto text =
+      "dimension = 3\n[structure]\nmesh = { bar = { size = [2, 1, 0.5], cells = [4, 2, 2] } "
+      "}\n[structure.material]\nyoung = 1e9\n"
+      "poisson = 0\n[structure.fix.x0]\n[structure.move.x1]\ndisplacement = [1e-3, 0, "
+      "0]\n[structure.output]\nreactions = true\n"
+      "[structure.output.point.middle]\nat = [1, 0.5, 0.25]\nstress = "
+      "true\n[structure.output.point.end]\nat = [2, 0, 0]\n";
+  Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  protocol::Run alone = run();
+  alone.uses.clear();
+  structure.start(alone);
+  const auto found = quantities(structure.advance(window(0), {}));
+  const double stress = 1e9 * 0.5e-3;
+  EXPECT_NEAR(found.at("middle.displacement.x"), 0.5e-3, 1e-15);
+  EXPECT_NEAR(found.at("end.displacement.x"), 1e-3, 1e-15);
+  EXPECT_EQ(found.count("end.stress.xx"), 0u);
+  EXPECT_NEAR(found.at("middle.stress.xx"), stress, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.stress.xy"), 0, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.principal.1"), stress, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.principal.3"), 0, 1e-10 * stress);
+  EXPECT_NEAR(found.at("middle.von_mises"), stress, 1e-10 * stress);
+  EXPECT_NEAR(found.at("x0.reaction.x"), -stress * 0.5, 1e-10 * stress);
+  EXPECT_NEAR(found.at("x1.reaction.x"), stress * 0.5, 1e-10 * stress);
+  EXPECT_NEAR(found.at("reaction.x"), 0, 1e-10 * stress);
+}
+
+// Large displacements: a slender strip under P L²/(E I) = 10 bends to 0.810609 L (Mattiasson 1981),
+// whether in one window or in four, after an iteration that was rejected; small displacements would
+// say 3.33 L.
+TEST_F(AStructure, BendsFarWhenDisplacementsAreLarge) {
+  const std::string text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [1, 0.01], cells = [30, 1] } "
+      "}\ndisplacements = \"large\"\nplane = \"stress\"\n"
+      "[structure.material]\nyoung = 1.2e9\npoisson = "
+      "0\n[structure.fix.x0]\n[structure.load.x1]\nforce = [0, -1000]\nramp = 0.04\n"
+      "[structure.output.point.tip]\nat = [1, 0.005]\n";
+  protocol::Run alone = run();
+  alone.uses.clear();
+  std::vector<double> tips;
+  for (const int windows : {1, 4}) {
+    Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+    structure.start(alone);
+    protocol::Advance last;
+    for (int w = 0; w < windows; ++w) {
+      structure.save();
+      structure.advance({w, w + 1, 0.0, 0.01}, {});
+      structure.restore();
+      const double length = 0.04 / windows;
+      last = structure.advance({w, w + 1, w * length, length}, {});
+    }
+    const auto found = quantities(last);
+    tips.push_back(found.at("tip.displacement.y"));
+    EXPECT_NEAR(tips.back(), -0.810609, 1e-3);
+    EXPECT_NEAR(found.at("reaction.y"), 1000, 1e-5);
+    EXPECT_GT(last.steps, 1u);
+  }
+  EXPECT_NEAR(tips[0], tips[1], 1e-8);
+}
+
 TEST_F(AStructure, RefusesSurfacesAndFieldsItDoesNotHave) {
   auto missing = run();
   missing.uses[0].surface = "inside";
@@ -199,6 +261,16 @@ TEST(Explanation, SaysWhatWillRun) {
                            "surfaces of the mesh: x0, x1", "no density, so no weight",
                            "direct (Cholesky, factored once)", "a window"})
     EXPECT_NE(lines.find(part), std::string::npos) << lines;
+  EXPECT_EQ(lines.find("warning"), std::string::npos) << lines;
+}
+
+TEST(Explanation, WarnsOfAMeshInMillimetres) {
+  const std::string text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [2000, 100], cells = [2, 1] } }\n"
+      "[structure.material]\nyoung = 1e9\npoisson = 0.2\n[structure.fix.x0]\n";
+  const auto lines = explain(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  EXPECT_NE(lines.find("warning: the mesh is 2002 m large. Lengths are metres"), std::string::npos)
+      << lines;
 }
 
 }  // namespace

@@ -1,0 +1,114 @@
+#include "fem/amplitude.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+namespace acopla::fem {
+namespace {
+
+Amplitude make(const io::Table& table, const std::string& key,
+               std::vector<std::pair<double, double>> points) {
+  try {
+    return Amplitude(std::move(points));
+  } catch (const std::invalid_argument& error) {
+    table.fail(key, error.what());
+  }
+}
+
+std::vector<std::pair<double, double>> pairs(const io::Table& table, const std::string& key) {
+  std::vector<std::pair<double, double>> points;
+  for (const auto& row : table.vectors(key, 2)) points.emplace_back(row[0], row[1]);
+  return points;
+}
+
+std::vector<std::pair<double, double>> read_columns(const std::string& path) {
+  std::ifstream file(path);
+  std::vector<std::pair<double, double>> points;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream words(line);
+    std::string first;
+    if (!(words >> first) || first[0] == '#') continue;
+    std::istringstream again(line);
+    double time = 0, value = 0;
+    std::string more;
+    if (!(again >> time >> value) || again >> more)
+      throw io::UserError({path, number, 1},
+                          "a line of a record has two numbers: time [s] and value.");
+    points.emplace_back(time, value);
+  }
+  return points;
+}
+
+}  // namespace
+
+Amplitude::Amplitude(std::vector<std::pair<double, double>> points) : points_(std::move(points)) {
+  if (points_.empty())
+    throw std::invalid_argument("has no points. Give at least one, [[t, value], …].");
+  integrals_.assign(points_.size(), 0.0);
+  for (std::size_t i = 1; i < points_.size(); ++i) {
+    const auto &a = points_[i - 1], &b = points_[i];
+    if (!(b.first > a.first))
+      throw std::invalid_argument(fmt::format(
+          "goes from t = {:.6g} s to t = {:.6g} s. Times must ascend; give a jump a short span.",
+          a.first, b.first));
+    integrals_[i] = integrals_[i - 1] + 0.5 * (a.second + b.second) * (b.first - a.first);
+  }
+}
+
+namespace {
+
+/// Index of the last point at or before `time`, or −1.
+std::ptrdiff_t segment(const std::vector<std::pair<double, double>>& points, double time) {
+  return std::upper_bound(
+             points.begin(), points.end(), time,
+             [](double t, const std::pair<double, double>& point) { return t < point.first; }) -
+         points.begin() - 1;
+}
+
+}  // namespace
+
+double Amplitude::value(double time) const {
+  const auto i = segment(points_, time);
+  if (i < 0) return points_.front().second;
+  const auto& [t, y] = points_[static_cast<std::size_t>(i)];
+  return y + rate(time) * (time - t);
+}
+
+double Amplitude::rate(double time) const {
+  const auto i = segment(points_, time);
+  if (i < 0 || i + 1 == std::ssize(points_)) return 0;
+  const auto &a = points_[static_cast<std::size_t>(i)],
+             &b = points_[static_cast<std::size_t>(i) + 1];
+  return (b.second - a.second) / (b.first - a.first);
+}
+
+double Amplitude::integral(double time) const {
+  const auto i = std::max<std::ptrdiff_t>(segment(points_, time), 0);
+  const auto& [t, y] = points_[static_cast<std::size_t>(i)];
+  return integrals_[static_cast<std::size_t>(i)] + 0.5 * (y + value(time)) * (time - t);
+}
+
+double Amplitude::mean(double start, double end) const {
+  return end > start ? (integral(end) - integral(start)) / (end - start) : value(start);
+}
+
+Amplitude read_amplitude(const io::Table& table) {
+  if (table.has("ramp") && table.has("amplitude"))
+    table.fail("ramp", "and amplitude are both given. Keep one of them.");
+  if (table.has("ramp")) return Amplitude({{0.0, 0.0}, {table.number("ramp", io::positive), 1.0}});
+  if (table.has("amplitude")) return make(table, "amplitude", pairs(table, "amplitude"));
+  return {};
+}
+
+Amplitude read_record(const io::Table& table, const std::string& key) {
+  if (!table.is_text(key)) return make(table, key, pairs(table, key));
+  return make(table, key, read_columns(table.path(key)));
+}
+
+}  // namespace acopla::fem

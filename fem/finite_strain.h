@@ -1,0 +1,54 @@
+// Large displacements: total Lagrangian statics of a St. Venant–Kirchhoff solid.
+#pragma once
+
+#include "fem/elasticity.h"
+#include "fem/linear_solver.h"
+#include "fem/statics.h"
+
+namespace acopla::fem {
+
+/// Internal forces and their derivative at a displacement.
+struct Linearisation {
+  Vector internal;  ///< ∫ F S ∇N_a dV [N], over the undeformed body
+  BlockMatrix tangent;  ///< K_ab = ∫ (∇N_a · S ∇N_b) I + F (λ ∇N_a ⊗ ∇N_b + μ ∇N_b ⊗ ∇N_a + μ (∇N_a
+                        ///< · ∇N_b) I) Fᵀ dV [N/m]
+};
+
+/// S = λ tr(E) I + 2 μ E, E = ½ (Fᵀ F − I), F = I + ∇u (Bonet & Wood 2008). Strains must stay
+/// moderate: the law softens in compression. @param pattern  of the stiffness
+Linearisation linearise(const Mesh& mesh, const Materials& materials,
+                        const Formulation& formulation, const Vector& displacement,
+                        const std::shared_ptr<const CoupledNodes>& pattern);
+
+/// Equilibrium f_int(u) = f by Newton's method with a line search, in as many steps of the load as
+/// it takes. Loads keep their direction and the area that they were given on. All given must
+/// outlive it.
+class LargeDisplacements {
+ public:
+  LargeDisplacements(const Mesh& mesh, const Materials& materials, const Fixed& fixed,
+                     const SolverOptions& options, const Formulation& formulation);
+
+  /// Goes from the equilibrium found last (at first: the undeformed body) to that under a load.
+  /// @param load  [N]; @param prescribed  displacements of held unknowns [m], or empty for zero
+  /// @throws std::runtime_error when no equilibrium is found, e.g. because the structure buckles
+  StaticSolution solve(const Vector& load, const Vector& prescribed = {});
+  /// Forgets where it was, and goes on from there next.
+  void restart_from(const Vector& displacement, const Vector& load);
+
+  std::size_t iterations() const { return iterations_; }
+
+ private:
+  bool equilibrate(const Vector& load, const Vector& prescribed, Vector& displacement);
+  double norm_of_free(const Vector& residual) const;
+
+  const Mesh& mesh_;
+  const Materials& materials_;
+  const Fixed& fixed_;
+  SolverOptions options_;
+  Formulation formulation_;
+  std::shared_ptr<const CoupledNodes> pattern_;
+  Vector displacement_, load_;
+  std::size_t iterations_ = 0;
+};
+
+}  // namespace acopla::fem
