@@ -226,7 +226,7 @@ def bytes_table(study, discs, spheres, largest):
     study.text("Beyond the least: a particle keeps its position at the last rebuild (32 bytes), id and material (5), and pads records to four doubles; the "
                "inertia stands where a load brings it along. A pair keeps the closing speed of the half step before and, for Mindlin, the stiffness of the step "
                "before, 8 bytes each (second order, and no energy made when it unloads), and its place in the list (4). With the list of neighbours, the pairs "
-               "that nearly touch, kept twice while they are renewed, and the grid, the process holds "
+               "that nearly touch, and the grid, the process holds "
                f"{largest['heap_particle']:.0f} bytes a particle at {largest['particles']} spheres with {largest['near'] / largest['particles']:.2f} near and "
                f"{largest['listed'] / largest['particles']:.2f} listed pairs each.")
 
