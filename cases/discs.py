@@ -1,23 +1,10 @@
-"""What the pictures of two-dimensional cases share: reading what acopla-dem writes, and drawing discs and lines."""
+"""What the pictures of two-dimensional cases share: finding what acopla-dem wrote, and drawing discs and lines."""
 import pathlib
-import re
 import tomllib
 
 import numpy as np
 from matplotlib.collections import EllipseCollection
-
-
-def read_points(path):
-    """Points and point data of a .vtp file with appended raw arrays, as acopla-dem writes it."""
-    head, data = path.read_bytes().split(b'<AppendedData encoding="raw">\n_', 1)
-    arrays = {}
-    for kind, name, parts, offset in re.findall(rb'type="(\w+)" Name="(\w+)" NumberOfComponents="(\d+)" format="appended" offset="(\d+)"', head):
-        start = int(offset)
-        size = int(np.frombuffer(data, "<u8", 1, start)[0])
-        values = np.frombuffer(data, {b"Float32": "<f4", b"Float64": "<f8", b"Int32": "<i4"}[kind], offset=start + 8,
-                               count=size // (8 if kind == b"Float64" else 4))
-        arrays[name.decode()] = values.reshape(-1, int(parts)) if int(parts) > 1 else values
-    return arrays
+from vtp import read_points  # noqa: F401: for those who import this
 
 
 def pictures_of(results, name):
