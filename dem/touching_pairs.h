@@ -36,7 +36,8 @@ class SavedPairs {
 /// member is exported.
 class TouchingPairs {
  public:
-  /// Finds the pairs anew. Their histories come from the present ones, or, where the list of neighbours is new, from `saved`.
+  /// Looks who came near and who left; the others keep their places and histories. Where the list of neighbours is new, all pairs are
+  /// found anew, with their histories from `saved`.
   /// @param rows  neighbours of the particles first, first + 1, … last − 1
   /// @param one_material  all particles of the scene are of one
   void refresh(const Particles& particles, const PairList& rows, std::uint32_t first, std::uint32_t last, double skin,

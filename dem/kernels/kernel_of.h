@@ -218,8 +218,8 @@ class KernelOf final : public Kernel {
     meeting.kinematics = k;
   }
 
-  // Some packs meet before the first is answered. A pack is one long chain of roots and quotients, and the processor cannot look far enough
-  // ahead to begin the next one meanwhile; the shorter chains of either half overlap.
+  // Some packs meet before the first is answered, and all are answered before the first pushes its particles. A pack is one long chain of
+  // roots and quotients, and the processor cannot look far enough ahead to begin the next one meanwhile; the shorter chains of one kind overlap.
   static constexpr std::size_t ahead = 8;
 
   template <bool ledger>
