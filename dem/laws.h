@@ -97,9 +97,9 @@ class Laws {
 
 /// What a library of laws was compiled against; a library of another one is refused. Kernels share arrays of packs with the engine, so the
 /// width of a pack is part of it.
-inline constexpr const char* laws_version = lanes == 8   ? "acopla laws 3, packs of eight"
-                                            : lanes == 4 ? "acopla laws 3, packs of four"
-                                                         : "acopla laws 3, packs of two";
+inline constexpr const char* laws_version = lanes == 8   ? "acopla laws 4, packs of eight"
+                                            : lanes == 4 ? "acopla laws 4, packs of four"
+                                                         : "acopla laws 4, packs of two";
 
 }  // namespace acopla::dem
 

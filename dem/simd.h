@@ -120,7 +120,8 @@ using RecordVector = double __attribute__((vector_size(32), may_alias));
 inline const RecordVector& as_vector(const Record& record) { return reinterpret_cast<const RecordVector&>(record); }
 inline RecordVector& as_vector(Record& record) { return reinterpret_cast<RecordVector&>(record); }
 
-/// A record a lane, by components: what a pack of contacts needs.
+/// A record a lane, by components: what a pack of contacts needs. Such aggregates, Vector too, are best not declared `const` where they are
+/// filled by a call: GCC 12 would not take them apart, and stores them for nobody to read.
 struct RecordPack {
   DoublePack x, y, z, w;
 };
@@ -239,6 +240,33 @@ inline RecordPack gathered(const Record* records, const std::uint32_t* which) {
   const auto *a = simd::halves(records[which[0]]), *b = simd::halves(records[which[1]]);
   return {DoublePack(__builtin_shufflevector(a[0], b[0], 0, 2)), DoublePack(__builtin_shufflevector(a[0], b[0], 1, 3)),
           DoublePack(__builtin_shufflevector(a[1], b[1], 0, 2)), DoublePack(__builtin_shufflevector(a[1], b[1], 1, 3))};
+#endif
+}
+
+/// Pairs of records.
+struct PairPack {
+  DoublePack x, y, z;           ///< of the first less those of the second
+  DoublePack sum_w, product_w;  ///< of both
+  DoublePack first_w;
+};
+/// Subtracts before it transposes, which saves half the shuffles.
+inline PairPack gathered(const Record* records, const std::uint32_t* first, const std::uint32_t* second) {
+#if defined(__AVX512F__) || defined(__AVX__)
+  using simd::Vector;
+#ifdef __AVX512F__
+  static constexpr Vector signs{-1, -1, -1, 1, -1, -1, -1, 1};
+  const auto row = [&](const std::uint32_t* which, std::size_t lane) { return simd::joined(records[which[lane]], records[which[lane + 4]]); };
+#else
+  static constexpr Vector signs{-1, -1, -1, 1};
+  const auto row = [&](const std::uint32_t* which, std::size_t lane) { return static_cast<Vector>(as_vector(records[which[lane]])); };
+#endif
+  const Vector a = row(first, 0), b = row(first, 1), c = row(first, 2), d = row(first, 3);
+  const Vector e = row(second, 0), f = row(second, 1), g = row(second, 2), h = row(second, 3);
+  RecordPack rows = simd::transposed(a + signs * e, b + signs * f, c + signs * g, d + signs * h);
+  return {rows.x, rows.y, rows.z, rows.w, simd::transposed(a * e, b * f, c * g, d * h).w, simd::transposed(a, b, c, d).w};
+#else
+  RecordPack a = gathered(records, first), b = gathered(records, second);
+  return {a.x - b.x, a.y - b.y, a.z - b.z, a.w + b.w, a.w * b.w, a.w};
 #endif
 }
 

@@ -114,7 +114,7 @@ void TouchingPairs::refresh(const Particles& particles, const PairList& rows, st
       i[lane] = pair.i;
       j[lane] = pair.j;
     }
-    const RecordPack a = gathered(position, i), b = gathered(position, j);
+    RecordPack a = gathered(position, i), b = gathered(position, j);
     const DoublePack dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z, reach = a.w + b.w + skin;
     // As a byte: GCC 12 under the address sanitizer stores the mask as one and reads it back as four.
     auto near = static_cast<std::uint8_t>(bits(dx * dx + dy * dy + dz * dz < reach * reach));

@@ -73,16 +73,16 @@ struct ElasticPlastic {
       twist = dot(turn, k.normal);
       turn = turn - twist * k.normal;
     }
-    const auto before = turned_with_frame(history.torque, k);
-    const auto yields = slides_at(turned_with_frame(history.torque, k, shear.softening) - increment * turn, limit, history.torque);
-    const typename K::Turn damping = select(yields, Real(0), dash) * turn;
+    auto before = turned_with_frame(history.torque, k);
+    const auto yields = slides_at(turned_with_frame(history.torque, k, shear.kept, shear.of) - increment * turn, limit, history.torque);
+    typename K::Turn damping = select(yields, Real(0), dash) * turn;
     energy = select(spring > Real(0), dot(history.torque, history.torque) / (2.0 * spring), Real(0));
     work = k.step * dot(damping - Real(0.5) * (before + history.torque), turn);
     typename K::Turn result = history.torque - damping;
     if constexpr (K::dimension == 3) {
       const Real twisting = p.twisting * spring, held = history.twist;
       Vector<Real, 1> kept;
-      const auto twists = slides_at(Vector<Real, 1>{shear.softening * held - p.twisting * increment * twist}, p.twisting * limit, kept);
+      const auto twists = slides_at(Vector<Real, 1>{shear.share() * held - p.twisting * increment * twist}, p.twisting * limit, kept);
       const Real twist_damping = select(twists, Real(0), p.twisting * dash) * twist;
       history.twist = kept.x;
       energy = energy + select(twisting > Real(0), kept.x * kept.x / (2.0 * twisting), Real(0));

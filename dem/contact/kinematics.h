@@ -32,29 +32,32 @@ struct Kinematics {
   Real reduced_mass;                 ///< 1 / (1/m_i + 1/m_j); m_i at a wall [kg]
   Vector<Real, dimension> normal;    ///< unit
   Turn slip;                         ///< tangential velocity of i's surface over j's at the contact point, at the half step [m/s]
-  Turn mean_spin;                    ///< (ω_i + ω_j) / 2: how the contact frame turns about its normal, half step [rad/s]
+  Real frame_spin;                   ///< n · (ω_i + ω_j) / 2: how the contact frame turns about its normal, half step [rad/s]; 0 in two dimensions
   Turn relative_spin;                ///< ω_i − ω_j, half step [rad/s]
   Real reduced_inertia;              ///< 1 / (1/I_i + 1/I_j); I_i at a wall [kg m²]
   Real rolling_inertia;              ///< 1 / (1/(I_i + m_i r_i²) + 1/(I_j + m_j r_j²)) (Gomes 2014, eq. 2.103); I_i + m_i r_i² at a wall
   double step;                       ///< Δt [s]
 };
 
-/// Carries a tangential vector of the previous step into the present tangent plane: it turns with the mean spin about
-/// the normal and tilts with the normal. Both small rotations are taken to first order and the length is then restored by
+/// Carries a tangential vector of the previous step into the present tangent plane: it turns with the frame about the normal and tilts
+/// with the normal. Both small rotations are taken to first order and the length is then restored by
 /// one step of Newton's root, to fourth order in the step's angle. A vector that lay out of the plane by more than 45° is
 /// not stretched back to its length: it is round-off, and would grow with every step. In the plane the tangent turns by itself.
-/// @param share  how much of it is kept, e.g. where a spring softens
+/// @param part, whole  part/whole of it is kept, e.g. where a spring softens; nothing where the whole is 0. Two numbers, so that one division
+///                     serves this quotient and the root's: dividing is what a law waits for
 template <class K>
-typename K::Turn turned_with_frame(const typename K::Turn& before, const K& k, const typename K::Real& share = typename K::Real(1)) {
+typename K::Turn turned_with_frame(const typename K::Turn& before, const K& k, const typename K::Real& part = typename K::Real(1),
+                                   const typename K::Real& whole = typename K::Real(1)) {
   using Real = typename K::Real;
-  if constexpr (K::dimension == 2) return share * before;
+  if constexpr (K::dimension == 2) return select(whole > Real(0), part / whole, Real(0)) * before;
   else {
     using std::min;
     const Real length = dot(before, before);
-    typename K::Turn after = before + (k.step * dot(k.mean_spin, k.normal)) * cross(k.normal, before);
+    typename K::Turn after = before + (k.step * k.frame_spin) * cross(k.normal, before);
     after = after - dot(after, k.normal) * k.normal;
     const Real kept = dot(after, after);
-    return (share * select(kept > Real(0), 0.5 * (1.0 + min(length / kept, Real(2))), Real(0))) * after;
+    const Real divisor = whole * kept;
+    return select(divisor > Real(0), 0.5 * part * (kept + min(length, 2.0 * kept)) / divisor, Real(0)) * after;
   }
 }
 

@@ -44,7 +44,8 @@ struct Mindlin {
   static ShearSpring<typename K::Real> spring(const typename K::Real& present, const History<K>& history) {
     using std::min;
     using Real = typename K::Real;
-    return {present, select(present < history.stiffness, present / history.stiffness, Real(1)), 0.5 * (present + min(present, history.stiffness))};
+    Real lower = min(present, history.stiffness);
+    return {present, lower, history.stiffness, 0.5 * (present + lower)};
   }
   template <class Normal, class K>
   static typename K::Real dashpot(const K& k, const Parameters& p, const typename Normal::Parameters& normal) {
@@ -59,7 +60,7 @@ struct Mindlin {
     const auto now = spring(stiffness<Normal>(k, p, normal), history);
     before = turned_with_frame(history.force, k);
     history.stiffness = now.stiffness;
-    return held_by_friction(turned_with_frame(history.force, k, now.softening) - (k.step * now.increment) * k.slip, p.friction * normal_force,
+    return held_by_friction(turned_with_frame(history.force, k, now.kept, now.of) - (k.step * now.increment) * k.slip, p.friction * normal_force,
                             dashpot<Normal>(k, p, normal), k.slip, history.force);
   }
 };

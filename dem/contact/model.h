@@ -104,7 +104,7 @@ struct ContactModel {
       energy->viscous = select(touches, response.normal - elastic, Real(0));
       energy->normal_dashpot = energy->viscous * k.closing_speed;
     }
-    ShearSpring<Real> shear{Real(0), Real(1), Real(0)};
+    ShearSpring<Real> shear{Real(0), Real(1), Real(1), Real(0)};
     if constexpr (has_friction) {
       typename K::Turn before;
       shear.stiffness = shear.increment = Tangential::template stiffness<Normal>(k, p.tangential, p.normal);

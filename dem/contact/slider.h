@@ -8,8 +8,9 @@ namespace acopla::dem {
 template <class Real>
 struct ShearSpring {
   Real stiffness;  ///< k_t [N/m]; 0 without a tangential law
-  Real softening;  ///< k_t over that of the last step where it has fallen, else 1
+  Real kept, of;   ///< where k_t has fallen since the last step, the spring keeps kept/of of its force; 1 elsewhere
   Real increment;  ///< k_t of this step's increment [N/m]
+  Real share() const { return select(of > Real(0), kept / of, Real(0)); }
 };
 
 /// A spring that slides at a limit: what friction and rolling resistance have in common.
@@ -28,7 +29,7 @@ template <class Real, int size>
 Vector<Real, size> held_by_friction(const Vector<Real, size>& trial, const Real& limit, const Real& dashpot, const Vector<Real, size>& slip,
                                     Vector<Real, size>& elastic) {
   const auto slides = dot(trial, trial) > limit * limit;
-  const auto together = shortened(trial - select(slides, Real(0), dashpot) * slip, limit);
+  auto together = shortened(trial - select(slides, Real(0), dashpot) * slip, limit);
   elastic = select(slides, together, trial);
   return together;
 }

@@ -89,6 +89,17 @@ class KernelOf final : public Kernel {
     if constexpr (dimension == 2) return {b.velocity.z};
     else return {b.spin.x, b.spin.y, b.spin.z};
   }
+  static Turn spins(const Particles& particles, const std::uint32_t* which) {
+    if constexpr (dimension == 2) return {gathered(particles.velocity.data(), which).z};
+    else {
+      RecordPack spin = gathered(particles.spin.data(), which);
+      return {spin.x, spin.y, spin.z};
+    }
+  }
+  static Vector<DoublePack, dimension> first_of(const PairPack& pair) {
+    if constexpr (dimension == 2) return {pair.x, pair.y};
+    else return {pair.x, pair.y, pair.z};
+  }
   static Vector<DoublePack, dimension> velocity_of(const Body& b) {
     if constexpr (dimension == 2) return {b.velocity.x, b.velocity.y};
     else return {b.velocity.x, b.velocity.y, b.velocity.z};
@@ -187,32 +198,28 @@ class KernelOf final : public Kernel {
 
   static void meet(const Particles& particles, const std::uint32_t* i, const std::uint32_t* j, double step, Meeting& meeting) {
     using std::max, std::sqrt;
-    const Body a = body(particles, i), b = body(particles, j);
+    PairPack positions = gathered(particles.position.data(), i, j), velocities = gathered(particles.velocity.data(), i, j);
     Pack k;
     k.step = step;
-    Vector<DoublePack, dimension> between;
-    if constexpr (dimension == 2) between = {a.position.x - b.position.x, a.position.y - b.position.y};
-    else between = {a.position.x - b.position.x, a.position.y - b.position.y, a.position.z - b.position.z};
-    const DoublePack distance = sqrt(dot(between, between));
-    const DoublePack radii = a.position.w + b.position.w, masses = a.velocity.w + b.velocity.w;
+    auto between = first_of(positions), relative = first_of(velocities);
+    const DoublePack distance = sqrt(dot(between, between)), radii = positions.sum_w, masses = velocities.sum_w;
     // One division for three quotients: 1/d, r r/(r + r), m m/(m + m).
     const DoublePack sums = radii * masses, inverse = 1.0 / (distance * sums), inverse_sums = distance * inverse;
     k.normal = (sums * inverse) * between;
     k.overlap = max(DoublePack(0.0), radii - distance);
-    k.reduced_radius = a.position.w * b.position.w * masses * inverse_sums;
-    k.reduced_mass = a.velocity.w * b.velocity.w * radii * inverse_sums;
-    const auto relative = velocity_of(a) - velocity_of(b);
+    k.reduced_radius = positions.product_w * masses * inverse_sums;
+    k.reduced_mass = velocities.product_w * radii * inverse_sums;
     const DoublePack along = dot(relative, k.normal);
     k.closing_speed = -along;
-    meeting.arm_i = a.position.w - 0.5 * k.overlap;
-    meeting.arm_j = b.position.w - 0.5 * k.overlap;
     if constexpr (Model::rotates) {
-      const Turn spin_i = spin_of(a), spin_j = spin_of(b);
+      meeting.arm_i = positions.first_w - 0.5 * k.overlap;
+      meeting.arm_j = (radii - positions.first_w) - 0.5 * k.overlap;
+      Turn spin_i = spins(particles, i), spin_j = spins(particles, j);
       k.slip = slip(relative, along, meeting.arm_i * spin_i + meeting.arm_j * spin_j, k.normal);
-      k.mean_spin = DoublePack(0.5) * (spin_i + spin_j);
+      if constexpr (dimension == 3) k.frame_spin = 0.5 * dot(spin_i + spin_j, k.normal);
       if constexpr (Model::has_rolling) {
         k.relative_spin = spin_i - spin_j;
-        set_inertias(k, a, b);
+        set_inertias(k, body(particles, i), body(particles, j));
       }
     }
     meeting.kinematics = k;
@@ -237,9 +244,10 @@ class KernelOf final : public Kernel {
       }
       for (std::size_t c = begin; c < end; c += lanes) {
         const Push& p = pushes[(c - begin) / lanes];
+        const Meeting& m = meetings[(c - begin) / lanes];
         const auto count = std::min(lanes, contacts.size - c);
-        if (contacts.exports) push_one(particles, contacts, exports, c, count, p);
-        else push_both(particles, contacts, c, count, p);
+        if (contacts.exports) push_one(particles, contacts, exports, c, count, p, m);
+        else push_both(particles, contacts, c, count, p, m);
       }
     }
   }
@@ -249,28 +257,25 @@ class KernelOf final : public Kernel {
   struct Push {
     Vector<DoublePack, dimension> force;
     Turn turning, rolling;
-    DoublePack arm_i, arm_j;
   };
   template <bool ledger>
   static void push(const Meeting& meeting, const typename Model::Parameters& parameters, HistoryLane* stored, const DoublePack& weight,
                    ContactEnergy<double>* energy, Push& push) {
     Pack k = meeting.kinematics;
-    const auto r = answer<ledger>(k, parameters, stored, weight, energy);
+    auto r = answer<ledger>(k, parameters, stored, weight, energy);
     push.force = force_of(r, k.normal);
     if constexpr (Model::rotates) {
       push.turning = turning_of(r, k.normal);
-      push.arm_i = meeting.arm_i;
-      push.arm_j = meeting.arm_j;
       if constexpr (Model::has_rolling) push.rolling = r.torque;
     }
   }
 
   // Both bodies take the same rows: the force's, and in space the turning's, which either multiplies by its arm.
-  static void push_both(Particles& particles, const PairContacts& contacts, std::size_t c, std::size_t count, const Push& push) {
+  static void push_both(Particles& particles, const PairContacts& contacts, std::size_t c, std::size_t count, const Push& push, const Meeting& meeting) {
     const std::uint32_t *const i = &contacts.i[c], *const j = &contacts.j[c];
     if constexpr (dimension == 2) {
-      add_to(particles.force.data(), i, count, with_torque(push.force, torque_on(push, push.arm_i, 1)));
-      add_to(particles.force.data(), j, count, with_torque(-push.force, torque_on(push, push.arm_j, -1)));
+      add_to(particles.force.data(), i, count, with_torque(push.force, torque_on(push, meeting.arm_i, 1)));
+      add_to(particles.force.data(), j, count, with_torque(-push.force, torque_on(push, meeting.arm_j, -1)));
     } else {
       Record *const force = particles.force.data(), *const torque = particles.torque.data();
       const simd::Rows forces(record_of(push.force));
@@ -283,7 +288,7 @@ class KernelOf final : public Kernel {
         });
       } else {
         const simd::Rows turnings(record_of(push.turning)), rollings(record_of(Model::has_rolling ? push.rolling : push.turning));
-        const auto *const arm_i = reinterpret_cast<const double*>(&push.arm_i), *const arm_j = reinterpret_cast<const double*>(&push.arm_j);
+        const auto *const arm_i = reinterpret_cast<const double*>(&meeting.arm_i), *const arm_j = reinterpret_cast<const double*>(&meeting.arm_j);
         simd::for_each_lane(count, [&](std::size_t lane) {
           forces.of(lane, [&](const auto& row) {
             simd::add(force[i[lane]], row);
@@ -305,9 +310,10 @@ class KernelOf final : public Kernel {
     }
   }
   // The second body belongs to another partition.
-  static void push_one(Particles& particles, const PairContacts& contacts, Exports& exports, std::size_t c, std::size_t count, const Push& push) {
-    add_forces(particles, &contacts.i[c], count, push.force, torque_on(push, push.arm_i, 1));
-    const Turn torque = torque_on(push, push.arm_j, -1);
+  static void push_one(Particles& particles, const PairContacts& contacts, Exports& exports, std::size_t c, std::size_t count, const Push& push,
+                       const Meeting& meeting) {
+    add_forces(particles, &contacts.i[c], count, push.force, torque_on(push, meeting.arm_i, 1));
+    Turn torque = torque_on(push, meeting.arm_j, -1);
     write(&exports.force[contacts.first_export + c], count, with_torque(-push.force, torque));
     if constexpr (dimension == 3 && Model::rotates) write(&exports.torque[contacts.first_export + c], count, record_of(torque));
   }
@@ -335,8 +341,8 @@ class KernelOf final : public Kernel {
     for (std::size_t c = 0; c < contacts.size; c += lanes) {
       const auto count = std::min(lanes, contacts.size - c);
       const std::uint32_t* i = &contacts.particle[c];
-      const Body a = body(particles, i);
-      const RecordPack normal = loaded(&contacts.normal[c]), wall = loaded(&contacts.velocity[c]);
+      Body a = body(particles, i);
+      RecordPack normal = loaded(&contacts.normal[c]), wall = loaded(&contacts.velocity[c]);
       Pack k;
       k.step = step;
       Vector<DoublePack, dimension> relative;
@@ -355,16 +361,16 @@ class KernelOf final : public Kernel {
       k.closing_speed = -along;
       const DoublePack arm = a.position.w - normal.w;  // to the contact point
       if constexpr (Model::rotates) {
-        const Turn spin = spin_of(a);
+        Turn spin = spin_of(a);
         k.slip = slip(relative, along, arm * spin, k.normal);
-        k.mean_spin = DoublePack(0.5) * spin;
+        if constexpr (dimension == 3) k.frame_spin = 0.5 * dot(spin, k.normal);
         k.relative_spin = spin;
         if (!contacts.wall_spin.empty()) {
-          const RecordPack turns = loaded(&contacts.wall_spin[c]);
+          RecordPack turns = loaded(&contacts.wall_spin[c]);
           Turn wall_spin;
           if constexpr (dimension == 2) wall_spin = {turns.z};
           else wall_spin = {turns.x, turns.y, turns.z};
-          k.mean_spin = k.mean_spin + DoublePack(0.5) * wall_spin;
+          if constexpr (dimension == 3) k.frame_spin = k.frame_spin + 0.5 * dot(wall_spin, k.normal);
           k.relative_spin = k.relative_spin - wall_spin;
         }
         if constexpr (Model::has_rolling) {
@@ -373,12 +379,12 @@ class KernelOf final : public Kernel {
         }
       }
       HistoryLane* const stored = &contacts.history[c / lanes * numbers];
-      const auto r = answer<ledger>(k, parameters, stored, ledger ? wall.w * first_lanes(count) : DoublePack(1.0), energy);
-      const auto force = wall.w * force_of(r, k.normal);
+      auto r = answer<ledger>(k, parameters, stored, ledger ? wall.w * first_lanes(count) : DoublePack(1.0), energy);
+      auto force = wall.w * force_of(r, k.normal);
       Turn torque = zero_vector<DoublePack, Pack::turns>();
       if constexpr (Model::rotates) torque = -((wall.w * arm) * turning_of(r, k.normal));
       if constexpr (Model::has_rolling) {
-        const Turn rolling = wall.w * r.torque;
+        Turn rolling = wall.w * r.torque;
         torque = torque + rolling;
         write(&contacts.torque[c], count, record_of(rolling));
       }

@@ -207,7 +207,7 @@ TEST(TangentialHistory, TurnsWithTheFrame) {
     for (int n = 0; n < steps; ++n) {
       normal = turn * normal;
       k.normal = vector_of<3>(normal.normalized());
-      k.mean_spin = vector_of<3>(axis * (angle / k.step));
+      k.frame_spin = axis.dot(normal) * angle / k.step;
       force = eigen(turned_with_frame(vector_of<3>(force), k));
     }
     const Vec3 expected = Eigen::AngleAxisd(M_PI / 2, axis) * Vec3(0.3, 0.4, 0);
@@ -223,7 +223,7 @@ TEST(ConstantTorque, OpposesTheRelativeSpinAndCannotReverseIt) {
   const auto torque = [&](const Vec3& spin) {
     auto k = contact<3>(1e-4);
     k.relative_spin = vector_of<3>(spin);
-    return eigen(ConstantTorque::torque(k, 10.0, {0, 1, 0}, {0.05}, none, energy, work));
+    return eigen(ConstantTorque::torque(k, 10.0, {0, 1, 1, 0}, {0.05}, none, energy, work));
   };
   EXPECT_LT((torque({3, 4, 0}) + 0.05 * 10 * radius * Vec3(0.6, 0.8, 0)).norm(), 1e-18);  // μ_r F_n R
   EXPECT_NEAR(torque({3e-9, 4e-9, 0}).norm() * 1e-5 / 1e-7, ConstantTorque::share * 5e-9, 1e-24);
@@ -237,7 +237,7 @@ Vec3 rolling(K k, const Vec3& spin, double normal_force, double shear_stiffness,
   ElasticPlastic::History<K> history{};
   double energy, work;
   typename K::Turn torque{};
-  for (int n = 0; n < steps; ++n) torque = ElasticPlastic::torque(k, normal_force, {shear_stiffness, 1, shear_stiffness}, p, history, energy, work);
+  for (int n = 0; n < steps; ++n) torque = ElasticPlastic::torque(k, normal_force, {shear_stiffness, 1, 1, shear_stiffness}, p, history, energy, work);
   return eigen(torque);
 }
 

@@ -119,7 +119,7 @@ struct ClosedPath {
     if constexpr (dimension == 2) k.slip = {speed[0]};
     else k.slip = vector_of<3>(speed[0] * across[0] + speed[1] * across[1]);
     k.relative_spin = vector_of<K::turns>(spin);
-    k.mean_spin = zero_vector<double, K::turns>();
+    k.frame_spin = 0;
     return k;
   }
 };
