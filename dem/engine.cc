@@ -212,12 +212,11 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
     if (steps_since_rebuild_ < 20) skin_ = std::min(1.2 * skin_, 0.8 * smallest_);
     else if (steps_since_rebuild_ > 400) skin_ = std::max(0.85 * skin_, 0.08 * smallest_);
   }
-  saved_pairs_.clear();
+  const auto parts = static_cast<std::uint32_t>(partitions_.size());
+  saved_pairs_.clear(parts);
   saved_walls_.clear();
-  for (auto& partition : partitions_) {
-    partition.pairs.save(saved_pairs_, kernels_);
-    partition.walls.collect(particles_, saved_walls_);
-  }
+  team_.run(parts, [&](unsigned p) { partitions_[p].pairs.save(saved_pairs_, p, kernels_); });
+  for (auto& partition : partitions_) partition.walls.collect(particles_, saved_walls_);
   saved_walls_.sort();
   place_.resize(particles_.size());
   std::iota(place_.begin(), place_.end(), 0u);
@@ -227,10 +226,11 @@ void Engine::rebuild(const std::vector<std::uint32_t>* stay) {
     curve_order(particles_.position, order_);
     sort_particles(order_);
   }
-  grid_.build(particles_.position, skin_);
-  saved_pairs_.settle(place_, kernels_, particles_.size());
+  team_.run(2, [&](unsigned task) {
+    if (task == 0) grid_.build(particles_.position, skin_);
+    else saved_pairs_.settle(place_, kernels_, particles_.size());
+  });
   const auto count = static_cast<std::uint32_t>(particles_.size());
-  const auto parts = static_cast<std::uint32_t>(partitions_.size());
   walls_.mark(domain_.low, domain_.high, largest_);
   team_.run(parts, [&](unsigned p) {
     auto& partition = partitions_[p];

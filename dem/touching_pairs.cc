@@ -5,45 +5,51 @@
 
 namespace acopla::dem {
 
-void SavedPairs::clear() {
-  pairs_.clear();
-  values_.clear();
+void SavedPairs::clear(std::size_t writers) {
+  written_.resize(writers);
+  for (auto& written : written_) {
+    written.pairs.clear();
+    written.values.clear();
+  }
 }
 
-void SavedPairs::add(std::uint32_t i, std::uint32_t j, std::size_t group, const HistoryLane* first, std::size_t numbers, std::size_t lane) {
+void SavedPairs::add(std::size_t writer, std::uint32_t i, std::uint32_t j, std::size_t group, const HistoryLane* first, std::size_t numbers, std::size_t lane) {
   bool empty = true;
   for (std::size_t n = 0; n < numbers; ++n) empty &= first[n].value[lane] == 0;
   if (empty) return;
-  pairs_.push_back({i, j, static_cast<std::uint32_t>(group), static_cast<std::uint32_t>(values_.size())});
-  for (std::size_t n = 0; n < numbers; ++n) values_.push_back(first[n].value[lane]);
+  auto& [pairs, values] = written_[writer];
+  pairs.push_back({i, j, static_cast<std::uint16_t>(group), static_cast<std::uint16_t>(writer), static_cast<std::uint32_t>(values.size())});
+  for (std::size_t n = 0; n < numbers; ++n) values.push_back(first[n].value[lane]);
 }
 
 void SavedPairs::settle(const std::vector<std::uint32_t>& place, const KernelTable& kernels, std::size_t particles) {
   start_.assign(particles + 1, 0);
-  for (auto& pair : pairs_) {
-    pair.i = place[pair.i];
-    pair.j = place[pair.j];
-    if (pair.i == gone || pair.j == gone) {
-      pair.i = gone;
-      continue;
+  for (auto& [pairs, values] : written_)
+    for (auto& pair : pairs) {
+      pair.i = place[pair.i];
+      pair.j = place[pair.j];
+      if (pair.i == gone || pair.j == gone) {
+        pair.i = gone;
+        continue;
+      }
+      if (pair.i > pair.j) {
+        std::swap(pair.i, pair.j);
+        const auto signs = kernels.kernel[pair.group]->swap_signs();
+        for (std::size_t n = 0; n < signs.size(); ++n) values[pair.first + n] *= signs[n];
+      }
+      ++start_[pair.i + 1];
     }
-    if (pair.i > pair.j) {
-      std::swap(pair.i, pair.j);
-      const auto signs = kernels.kernel[pair.group]->swap_signs();
-      for (std::size_t n = 0; n < signs.size(); ++n) values_[pair.first + n] *= signs[n];
-    }
-    ++start_[pair.i + 1];
-  }
   for (std::size_t k = 0; k + 1 < start_.size(); ++k) start_[k + 1] += start_[k];
   sorted_.resize(start_.back());
   auto next = start_;
-  for (const auto& pair : pairs_)
-    if (pair.i != gone) sorted_[next[pair.i]++] = pair;
+  for (const auto& written : written_)
+    for (const auto& pair : written.pairs)
+      if (pair.i != gone) sorted_[next[pair.i]++] = pair;
 }
 
 const double* SavedPairs::find(std::uint32_t i, std::uint32_t j) const {
   for (auto k = start_[i]; k < start_[i + 1]; ++k)
-    if (sorted_[k].j == j) return &values_[sorted_[k].first];
+    if (sorted_[k].j == j) return &written_[sorted_[k].writer].values[sorted_[k].first];
   return nullptr;
 }
 
@@ -189,14 +195,14 @@ void TouchingPairs::restore(const SavedPairs& saved, const KernelTable& kernels)
   }
 }
 
-void TouchingPairs::save(SavedPairs& saved, const KernelTable& kernels) const {
+void TouchingPairs::save(SavedPairs& saved, std::size_t writer, const KernelTable& kernels) const {
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const auto* kernel = kernels.kernel[g / 2].get();
     const auto numbers = kernel ? kernel->history_size() : 0;
     if (numbers == 0) continue;
     const auto& group = groups_[g];
     for (std::size_t c = 0; c < group.size; ++c)
-      saved.add(group.i[c], group.j[c], g / 2, &group.history[c / lanes * numbers], numbers, c % lanes);
+      saved.add(writer, group.i[c], group.j[c], g / 2, &group.history[c / lanes * numbers], numbers, c % lanes);
   }
 }
 

@@ -11,8 +11,9 @@ namespace acopla::dem {
 /// Histories between two lists of neighbours: the particles may have new places in between.
 class SavedPairs {
  public:
-  void clear();
-  void add(std::uint32_t i, std::uint32_t j, std::size_t group, const HistoryLane* first, std::size_t numbers, std::size_t lane);
+  /// Forgets all. @param writers  who may add at the same time
+  void clear(std::size_t writers);
+  void add(std::size_t writer, std::uint32_t i, std::uint32_t j, std::size_t group, const HistoryLane* first, std::size_t numbers, std::size_t lane);
   /// Gives the pairs their new places, and sorts them by the lower one. @param place  new place of every old one; `gone` where removed
   void settle(const std::vector<std::uint32_t>& place, const KernelTable& kernels, std::size_t particles);
   /// The history of the pair i < j in that group, or null.
@@ -23,12 +24,16 @@ class SavedPairs {
  private:
   struct Pair {
     std::uint32_t i, j;
-    std::uint32_t group;
-    std::uint32_t first;  // in values_
+    std::uint16_t group, writer;
+    std::uint32_t first;  // in the writer's values
   };
-  std::vector<Pair> pairs_, sorted_;
+  struct Written {
+    std::vector<Pair> pairs;
+    std::vector<double> values;
+  };
+  std::vector<Written> written_;
+  std::vector<Pair> sorted_;
   std::vector<std::uint32_t> start_;
-  std::vector<double> values_;
 };
 
 /// The touching pairs of one partition: those that the list of neighbours holds and that are nearer than a small skin of their own, so
@@ -43,7 +48,7 @@ class TouchingPairs {
   void refresh(const Particles& particles, const PairList& rows, std::uint32_t first, std::uint32_t last, double skin,
                const KernelTable& kernels, bool one_material, const SavedPairs* saved);
   /// Adds every history that is not zero.
-  void save(SavedPairs& saved, const KernelTable& kernels) const;
+  void save(SavedPairs& saved, std::size_t writer, const KernelTable& kernels) const;
   /// Forces of all pairs.
   void evaluate(const KernelTable& kernels, Particles& particles, double step, ContactEnergy<double>* energy);
 
