@@ -148,12 +148,68 @@ void read_interfaces(const io::Table& coupling, Case& read) {
     if (read.receives(interface.from.participant))
       throw io::UserError(
           interface.from_at,
-          fmt::format("{} receives forces and sends some too: that is two-way, and this version "
-                      "does scheme = \"one-way\". Remove one of the interfaces.",
+          fmt::format("{} receives forces and sends some too. A participant does one of the two: in a two-way scheme who "
+                      "receives forces answers with its motion by itself. Remove one of the interfaces.",
                       interface.from.participant));
 }
 
+void read_scheme(const io::Table& coupling, bool couples, Case& read) {
+  const std::vector<std::string> schemes{"one-way", "explicit", "parallel", "implicit"};
+  const auto scheme = couples ? coupling.choice("scheme", schemes) : coupling.choice("scheme", schemes, "one-way");
+  read.scheme = scheme == "explicit"   ? SchemeKind::serial_explicit
+                : scheme == "parallel" ? SchemeKind::parallel_explicit
+                : scheme == "implicit" ? SchemeKind::serial_implicit
+                                       : SchemeKind::one_way;
+  if (read.scheme == SchemeKind::parallel_explicit && !coupling.flag("allow_unstable_scheme", false))
+    coupling.fail("scheme",
+                  "= \"parallel\" loads the structure with the force of the window before, which makes energy at every window's length unless "
+                  "the structure damps at least half of contact frequency times window. Use \"explicit\" or \"implicit\", or say "
+                  "allow_unstable_scheme = true.");
+  if (read.scheme != SchemeKind::serial_implicit) {
+    for (const char* key : {"acceleration", "relaxation", "reuse", "filter", "tolerance", "max_iterations", "on_fail"})
+      if (coupling.has(key)) coupling.fail(key, "has a meaning with scheme = \"implicit\" only. Remove it.");
+    return;
+  }
+  auto& implicit = read.implicit;
+  const auto kind = coupling.choice("acceleration", {"iqn-ils", "aitken", "constant"}, "iqn-ils");
+  implicit.acceleration.kind = kind == "aitken"     ? AccelerationKind::aitken
+                               : kind == "constant" ? AccelerationKind::constant
+                                                    : AccelerationKind::iqn_ils;
+  implicit.acceleration.relaxation = coupling.number("relaxation", {0, 1, true, false, "A step longer than 1 leaves the line."}, 0.5);
+  if (implicit.acceleration.kind == AccelerationKind::iqn_ils) {
+    implicit.acceleration.reuse = static_cast<int>(coupling.integer("reuse", 0, 1000, 0));
+    implicit.acceleration.filter = coupling.number("filter", {0, 1, false, true, "It is a fraction."}, implicit.acceleration.filter);
+  }
+  if (coupling.is_table("tolerance")) {
+    const auto tolerance = coupling.table("tolerance");
+    implicit.relative = tolerance.number("relative", io::non_negative, implicit.relative);
+    implicit.displacement = tolerance.number("displacement", io::non_negative, 0.0);
+    implicit.force = tolerance.number("force", io::non_negative, 0.0);
+    if (implicit.relative == 0 && (implicit.displacement == 0 || implicit.force == 0))
+      tolerance.fail("relative", "= 0 needs both displacement [m] and force [N], since no window agrees with itself to the last bit.");
+  } else {
+    implicit.relative = coupling.number("tolerance", io::positive, implicit.relative);
+  }
+  implicit.most_iterations = static_cast<int>(coupling.integer("max_iterations", 1, 100000, implicit.most_iterations));
+  implicit.stops = coupling.choice("on_fail", {"stop", "accept"}, "stop") == "stop";
+}
+
 void read_loads(const io::Table& coupling, Case& read) {
+  if (read.scheme != SchemeKind::one_way) {
+    for (const char* key : {"loads", "at", "over", "loads_from"})
+      if (coupling.has(key)) coupling.fail(key, "has a meaning with scheme = \"one-way\" only. Remove it.");
+    const bool moves = std::any_of(read.interfaces.begin(), read.interfaces.end(), [](const auto& i) { return !i.recorded_only(); });
+    if (!moves) coupling.fail("scheme", "needs an interface with `to`: nobody would answer. Use \"one-way\".");
+    for (std::size_t a = 0; a < read.interfaces.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b)
+        if (read.interfaces[a].from == read.interfaces[b].from && !read.interfaces[a].recorded_only() && !read.interfaces[b].recorded_only())
+          throw io::UserError(read.interfaces[a].from_at,
+                              fmt::format("{} would be moved by two surfaces. Split it into one surface for each.", read.interfaces[a].from.text()));
+    for (const auto& participant : read.participants)
+      if (participant.replay && read.receives(participant.name))
+        throw io::UserError(participant.at, fmt::format("{} is a record, which cannot answer with its motion. Use scheme = \"one-way\".", participant.name));
+    return;
+  }
   const auto loads = coupling.choice("loads", {"history", "mean", "snapshot"}, "history");
   read.loads = loads == "history" ? Loads::history
                : loads == "mean"  ? Loads::mean
@@ -202,11 +258,7 @@ void read_coupling(const io::Table& root, Case& read) {
   const auto coupling = root.table("coupling");
   // A participant alone only needs to know its windows.
   const bool couples = read.participants.size() > 1 || coupling.has("interface");
-  const std::vector<std::string> schemes{"one-way", "explicit", "parallel", "implicit"};
-  if ((couples ? coupling.choice("scheme", schemes)
-               : coupling.choice("scheme", schemes, "one-way")) != "one-way")
-    coupling.fail("scheme", fmt::format("= \"{}\" is not in this version yet. Use \"one-way\".",
-                                        coupling.text("scheme")));
+  read_scheme(coupling, couples, read);
   if (coupling.is_text("window"))
     coupling.fail("window", "must be a number of seconds in this version, e.g. 0.05.");
   read.window = coupling.number("window", io::positive);
@@ -224,6 +276,7 @@ void read_coupling(const io::Table& root, Case& read) {
   read.limits.force_loss = limits.number("force_loss", io::non_negative, read.limits.force_loss);
   read.limits.moment_loss = limits.number("moment_loss", io::non_negative, read.limits.moment_loss);
   read.limits.unmapped = limits.integer("unmapped", 0, std::int64_t{1} << 40, read.limits.unmapped);
+  if (read.scheme != SchemeKind::one_way) read.limits.energy_made = limits.optional_number("energy_made", io::non_negative);
   read_interfaces(coupling, read);
   read_loads(coupling, read);
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "coupler/acceleration/acceleration.h"
 #include "geometry/surface_mesh.h"
 #include "io/case_table.h"
 
@@ -49,12 +50,25 @@ struct ParticipantCase {
   std::string program() const;
 };
 
+enum class SchemeKind { one_way, serial_explicit, parallel_explicit, serial_implicit };
+
+/// How a window of the implicit scheme converges.
+struct ImplicitSettings {
+  AccelerationOptions acceleration;
+  double relative = 1e-6;      ///< of the motion of a window, and of its forces
+  double displacement = 0;     ///< norm over all nodes [m]
+  double force = 0;            ///< norm over all nodes [N]
+  int most_iterations = 50;
+  bool stops = true;           ///< where a window does not converge
+};
+
 enum class Loads { history, mean, snapshot };
 
 struct LedgerLimits {
   double force_loss = 1e-12;
   double moment_loss = 1e-12;
   std::int64_t unmapped = 0;
+  std::optional<double> energy_made;  ///< of all windows so far [J]
 };
 
 /// "participant.quantity" = { value, relative | absolute, … } of [expect].
@@ -74,6 +88,8 @@ struct Case {
   geometry::Vec3 gravity = geometry::Vec3::Zero();
   double end = 0, window = 0;  ///< [s]
   std::int64_t windows = 0;
+  SchemeKind scheme = SchemeKind::one_way;
+  ImplicitSettings implicit;
   Loads loads = Loads::history;
   std::int64_t loads_from = 0;  ///< first window that receivers are given (history)
   std::int64_t load_start = 0;  ///< windows [load_start, load_end) of a mean or snapshot

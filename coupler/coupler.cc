@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <memory>
 #include <optional>
 
+#include "coupler/account.h"
 #include "coupler/crew.h"
 #include "coupler/failure.h"
 #include "coupler/one_way.h"
 #include "coupler/quantities.h"
 #include "coupler/record.h"
+#include "coupler/two_way.h"
 #include "io/results.h"
 
 namespace acopla::coupler {
@@ -19,14 +22,21 @@ namespace {
 struct Stages {
   Quantities quantities;
   std::optional<Record> record;
-  std::optional<OneWay> scheme;
+  std::optional<Account> account;
+  std::unique_ptr<Scheme> scheme;
 };
+
+std::unique_ptr<Scheme> scheme_of(const Case& read, Crew& crew, Account& account) {
+  if (read.scheme == SchemeKind::one_way) return std::make_unique<OneWay>(read, crew, account);
+  return std::make_unique<TwoWay>(read, crew, account);
+}
 
 void compute(const Case& read, Crew& crew, const std::string& results, Reporter& reporter,
              Stages& stages, std::chrono::steady_clock::time_point begin) {
   crew.assemble();
   stages.record.emplace(read, results);
-  stages.scheme.emplace(read, crew, *stages.record, stages.quantities, reporter);
+  stages.account.emplace(read, crew, *stages.record, stages.quantities, reporter);
+  stages.scheme = scheme_of(read, crew, *stages.account);
   reporter.assembled(
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   stages.scheme->run();
@@ -72,11 +82,11 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
   outcome.end = read.end;
   outcome.participants = crew.outcomes();
   outcome.quantities = stages.quantities.last();
-  if (stages.scheme) {
-    outcome.windows = stages.scheme->complete();
+  if (stages.account) {
+    outcome.windows = stages.account->complete();
     outcome.reached = outcome.windows == read.windows ? read.end : read.time(outcome.windows);
-    outcome.ledgers = stages.scheme->ledgers();
-    outcome.interfaces = stages.scheme->interfaces();
+    outcome.ledgers = stages.account->ledgers();
+    outcome.interfaces = stages.account->interfaces();
   }
   for (const auto& expectation : read.expectations)
     outcome.expectations.push_back(stages.quantities.check(expectation));

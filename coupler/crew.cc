@@ -95,6 +95,20 @@ void Crew::begin_advance(const std::string& participant, std::int64_t start, std
   request(member, protocol::advance_message(window, fields));
 }
 
+void Crew::ask(const std::vector<std::string>& participants, Kind kind) {
+  const auto what = kind == Kind::save ? "saving its state" : "returning to the window's start";
+  for (const auto& name : participants) {
+    auto& member = members_.at(name);
+    if (member.replay) continue;  // what it plays follows from the window alone
+    enter(member, Member::Phase::returning, what);
+    Message message;
+    message.kind = kind;
+    request(member, std::move(message));
+  }
+  const auto busy = [&](const std::string& name) { return members_.at(name).phase == Member::Phase::returning; };
+  while (std::any_of(participants.begin(), participants.end(), busy)) turn(tick);
+}
+
 Crew::Answer Crew::next_answer() {
   while (answers_.empty()) turn(tick);
   auto answer = std::move(answers_.front());
@@ -181,6 +195,7 @@ void Crew::hear_member(Member& member, const Message& message) {
   }
   const bool in_turn = (member.phase == Phase::starting && message.kind == Kind::interface) ||
                        (member.phase == Phase::advancing && message.kind == Kind::advanced) ||
+                       (member.phase == Phase::returning && message.kind == Kind::done) ||
                        (member.phase == Phase::finishing && message.kind == Kind::done);
   if (!in_turn) fail(member, fmt::format("sent {} out of turn", protocol::name_of(message.kind)));
   if (member.phase != Phase::starting && message.sequence != member.sequence)
@@ -188,7 +203,9 @@ void Crew::hear_member(Member& member, const Message& message) {
          fmt::format("answered request {} while {} was asked", message.sequence, member.sequence));
   if (message.kind == Kind::interface) take_surfaces(member, protocol::read_interface(message));
   if (message.kind == Kind::advanced) take_advance(member, protocol::read_advanced(message));
-  if (message.kind == Kind::done) take_end(member, message);
+  if (message.kind != Kind::done) return;
+  if (member.phase == Phase::returning) enter(member, Phase::idle, "waiting for the others");
+  else take_end(member, message);
 }
 
 void Crew::hear_stranger(const protocol::Arrival& arrival) {
@@ -233,6 +250,13 @@ void Crew::admit(const std::string& peer, const Message& message) {
     refuse(peer, why);
     fail(member, why);
   }
+  const auto& can = hello.introduction.capabilities;
+  if (case_.scheme == SchemeKind::serial_implicit && std::find(can.begin(), can.end(), "save") == can.end()) {
+    const auto why = "cannot return to the start of a window (it does not offer \"save\"), which scheme = \"implicit\" asks of everybody. "
+                     "Use \"explicit\"";
+    refuse(peer, why);
+    fail(member, why);
+  }
   member.peer = peer;
   if (member.outcome.solver.empty()) member.outcome.solver = hello.introduction.solver;
   enter(member, Member::Phase::starting, "starting");
@@ -253,6 +277,7 @@ void Crew::take_surfaces(Member& member, std::vector<protocol::Surface> surfaces
   for (auto& surface : surfaces) {
     if (surface.name.find('/') != std::string::npos)
       fail(member, fmt::format("offers a surface with a slash in its name, \"{}\"", surface.name));
+    member.initial[surface.name] = {std::move(surface.displacement), std::move(surface.velocity)};
     if (!member.surfaces.emplace(surface.name, std::move(surface.mesh)).second)
       fail(member, fmt::format("offers the surface {} twice", surface.name));
   }
@@ -333,7 +358,7 @@ void Crew::check_health() {
                                "it, or look at its log",
                                case_.start_limit));
     const bool busy = member.phase == Phase::starting || member.phase == Phase::advancing ||
-                      member.phase == Phase::finishing;
+                      member.phase == Phase::returning || member.phase == Phase::finishing;
     if (busy && member.about->advance_limit &&
         seconds_between(member.since, now) > *member.about->advance_limit)
       fail(member, fmt::format("lives but made no progress for {:.6g} s (its advance_limit)",
@@ -348,7 +373,7 @@ void Crew::enter(Member& member, Member::Phase phase, const std::string& state) 
   const double spent = seconds_between(member.since, now);
   if (member.phase == Phase::idle) member.outcome.seconds_waiting += spent;
   if (member.phase == Phase::starting || member.phase == Phase::advancing ||
-      member.phase == Phase::finishing)
+      member.phase == Phase::returning || member.phase == Phase::finishing)
     member.outcome.seconds += spent;
   member.phase = phase;
   member.state = state;
@@ -382,10 +407,19 @@ protocol::Run Crew::run_for(const ParticipantCase& participant) const {
     return run.uses.back();
   };
   for (const auto& interface : case_.interfaces) {
-    if (interface.from.participant == participant.name)
-      use(interface.from.surface).sends = {"force"};
-    if (interface.to.participant == participant.name)
-      use(interface.to.surface).receives = {"force"};
+    const bool moves = case_.scheme != SchemeKind::one_way && !interface.recorded_only();
+    if (interface.from.participant == participant.name) {
+      auto& from = use(interface.from.surface);
+      from.sends = {"force"};
+      if (moves) from.receives = {"displacement", "velocity"};
+      if (moves && case_.scheme == SchemeKind::serial_implicit)
+        from.receives.insert(from.receives.end(), {"end_displacement", "end_velocity"});
+    }
+    if (interface.to.participant == participant.name) {
+      auto& to = use(interface.to.surface);
+      to.receives = {"force"};
+      if (moves) to.sends = {"displacement", "velocity"};
+    }
   }
   return run;
 }

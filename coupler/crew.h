@@ -38,6 +38,16 @@ class Crew {
   /// it has none such
   const geometry::SurfaceMesh& surface(const SurfaceName& name, const io::Location& asked_at) const;
 
+  /// A surface's motion when coupled time begins; empty where it is at rest.
+  struct Initial {
+    std::vector<geometry::Vec3> displacement, velocity;
+  };
+  const Initial& initial(const SurfaceName& name) const { return members_.at(name.participant).initial.at(name.surface); }
+
+  /// Everybody named remembers its state, or returns to it. All at once; done when all have answered. @throws Failure, Interrupted
+  void save(const std::vector<std::string>& participants) { ask(participants, protocol::Kind::save); }
+  void restore(const std::vector<std::string>& participants) { ask(participants, protocol::Kind::restore); }
+
   /// Asks a participant, which must be idle, for the windows [start, end).
   void begin_advance(const std::string& participant, std::int64_t start, std::int64_t end,
                      std::vector<protocol::Field> fields);
@@ -67,16 +77,19 @@ class Crew {
       starting,
       idle,
       advancing,
+      returning,  // or saving
       finishing,
       finished
     } phase = Phase::absent;
     std::string state = "not connected";
     std::uint64_t sequence = 0;
     std::map<std::string, geometry::SurfaceMesh> surfaces;
+    std::map<std::string, Initial> initial;
     Clock::time_point since;  // of the phase
     ParticipantOutcome outcome;
   };
 
+  void ask(const std::vector<std::string>& participants, protocol::Kind kind);
   void turn(std::chrono::milliseconds wait);
   void hear(protocol::Arrival arrival);
   void hear_member(Member& member, const protocol::Message& message);

@@ -1,12 +1,6 @@
 #include "coupler/one_way.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
-#include <stdexcept>
-
-#include "coupler/failure.h"
 
 namespace acopla::coupler {
 
@@ -18,69 +12,24 @@ namespace {
 // kept in memory.
 constexpr std::int64_t lead = 2;
 
-const std::vector<Vec3>& force_on(const protocol::Advance& advance, const std::string& surface) {
-  for (const auto& field : advance.fields)
-    if (field.surface == surface && field.name == "force") return field.values;
-  throw std::logic_error("a crew answer without its force");  // Crew refuses those
-}
-
 }  // namespace
 
-OneWay::OneWay(const Case& read, Crew& crew, Record& record, Quantities& quantities,
-               Reporter& reporter)
-    : case_(read), crew_(crew), record_(record), quantities_(quantities), reporter_(reporter) {
+OneWay::OneWay(const Case& read, Crew& crew, Account& account)
+    : case_(read), crew_(crew), account_(account) {
   for (const auto& participant : case_.participants) {
     if (case_.receives(participant.name))
       receivers_[participant.name];
     else
       senders_[participant.name] = 0;
   }
-  for (const auto& interface : case_.interfaces) build(interface);
-}
-
-void OneWay::build(const InterfaceCase& interface) {
-  Interface link{&interface, &crew_.surface(interface.from, interface.from_at), nullptr, nullptr};
-  if (interface.recorded_only()) {
-    record_.add_surface(interface.from.text(), *link.from);
-    record_.set_mapping(links_.size(), 0, 0);
-    interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
-    links_.push_back(std::move(link));
-    return;
-  }
-  link.to = &crew_.surface(interface.to, interface.to_at);
-  if (link.to->face_count() == 0)
-    throw io::UserError(interface.to_at, fmt::format("surface {} has no faces to receive forces.",
-                                                     interface.to.text()));
-  link.mapping =
-      std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance});
-  const auto& mapping = *link.mapping;
-  if (static_cast<std::int64_t>(mapping.unmapped()) > case_.limits.unmapped) {
-    const auto& point = link.from->points[mapping.unmapped_points().front()];
-    throw io::UserError(
-        interface.at,
-        fmt::format("{} of {} points of {} are farther than max_distance = {:.6g} m from {}, e.g. "
-                    "({:.6g}, {:.6g}, {:.6g}). "
-                    "Check that the surfaces stand in the same place and unit, raise "
-                    "coupling.max_distance, or allow that "
-                    "many in coupling.limits.unmapped.",
-                    mapping.unmapped(), link.from->points.size(), interface.from.text(),
-                    case_.max_distance, interface.to.text(), point[0], point[1], point[2]));
-  }
-  ledgers_.unmapped += static_cast<std::int64_t>(mapping.unmapped());
-  ledgers_.worst_distance = std::max(ledgers_.worst_distance, mapping.worst_distance());
-  record_.add_surface(interface.from.text(), *link.from);
-  record_.add_surface(interface.to.text(), *link.to);
-  record_.set_mapping(links_.size(), mapping.unmapped(), mapping.worst_distance());
-  interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
-  links_.push_back(std::move(link));
 }
 
 void OneWay::run() {
-  begin_ = std::chrono::steady_clock::now();
-  while (complete_ < case_.windows) {
+  account_.begin();
+  while (account_.complete() < case_.windows) {
     begin_what_can_begin();
     take(crew_.next_answer());
-    while (complete_ < case_.windows && is_complete(complete_)) close_window();
+    while (account_.complete() < case_.windows && is_complete(account_.complete())) close_window();
   }
 }
 
@@ -103,7 +52,7 @@ void OneWay::begin_what_can_begin() {
   // Receivers first: where a sender plays in this process, beginning it takes its time.
   for (auto& [name, receiver] : receivers_) begin_receiver(name, receiver);
   for (const auto& [name, answered] : senders_) {
-    if (sender_busy_[name] || answered >= std::min(case_.windows, complete_ + lead)) continue;
+    if (sender_busy_[name] || answered >= std::min(case_.windows, account_.complete() + lead)) continue;
     sender_busy_[name] = true;
     crew_.begin_advance(name, answered, answered + 1, {});
   }
@@ -144,40 +93,20 @@ void OneWay::note_quantities(const Crew::Answer& answer, std::int64_t window) {
     open_[window].quantities.emplace_back(answer.participant + "." + name, value);
 }
 
+// A load may be the mean of several windows.
 void OneWay::map_forces(const std::string& sender, std::int64_t window,
                         const protocol::Advance& advance) {
-  auto& record = open_[window];
-  record.ledger.resize(links_.size());
-  for (std::size_t k = 0; k < links_.size(); ++k) {
-    const auto& link = links_[k];
-    if (link.about->from.participant != sender) continue;
-    const auto& sent = force_on(advance, link.about->from.surface);
-    record.forces[link.about->from.text()] = sent;
-    const Vec3 centre = link.from->centroid();
-    auto& row = record.ledger[k];
-    row.sent = resultant(link.from->points, sent, centre);
-    if (!link.mapping) {
-      row.received = row.sent;
-      continue;
-    }
-    std::vector<Vec3> received(link.to->points.size());
-    link.mapping->forces(sent, received);
-    row.received = resultant(link.to->points, received, centre);
-    row.loss = loss(row.sent, row.received);
-    add_to_load(link, window, received);
-  }
-}
-
-// Several interfaces may end on one surface, and a load may be the mean of several windows.
-void OneWay::add_to_load(const Interface& link, std::int64_t window,
-                         const std::vector<Vec3>& forces) {
+  std::map<std::string, std::vector<Vec3>> received;
+  account_.map_forces(sender, advance, open_[window], received);
   const auto index = span_of(window);
   if (index < 0) return;
   const auto [start, end] = span(index);
   const double share = 1.0 / static_cast<double>(end - start);
-  auto& load = loads_[index][link.about->to.text()];
-  if (load.empty()) load.assign(forces.size(), Vec3::Zero());
-  for (std::size_t k = 0; k < forces.size(); ++k) load[k] += share * forces[k];
+  for (const auto& [surface, forces] : received) {
+    auto& load = loads_[index][surface];
+    if (load.empty()) load.assign(forces.size(), Vec3::Zero());
+    for (std::size_t k = 0; k < forces.size(); ++k) load[k] += share * forces[k];
+  }
 }
 
 bool OneWay::is_complete(std::int64_t window) const {
@@ -191,50 +120,11 @@ bool OneWay::is_complete(std::int64_t window) const {
 }
 
 void OneWay::close_window() {
-  auto& window = open_[complete_];
-  window.ledger.resize(links_.size());
-  record_.write(complete_, window);
-  const double end = case_.time(complete_ + 1);
-  for (const auto& [name, value] : window.quantities) quantities_.add(name, end, value);
-  for (std::size_t k = 0; k < links_.size(); ++k) {
-    const auto& row = window.ledger[k];
-    auto& outcome = interfaces_[k];
-    outcome.sent = row.sent.force;
-    outcome.received = row.received.force;
-    outcome.loss = row.loss.force;
-    outcome.worst_loss = std::max(outcome.worst_loss, row.loss.force);
-    ledgers_.force_loss = std::max(ledgers_.force_loss, row.loss.force);
-    ledgers_.moment_loss = std::max(ledgers_.moment_loss, row.loss.moment);
-  }
-  ++complete_;
-  const auto seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  reporter_.progress(complete_, case_.windows, end, seconds);
-  check_limits(window);
-  open_.erase(complete_ - 1);
-  if (const auto index = span_of(complete_ - 1); index >= 0 && span(index).second == complete_)
+  const auto window = account_.complete();
+  account_.close(open_[window]);
+  open_.erase(window);
+  if (const auto index = span_of(window); index >= 0 && span(index).second == window + 1)
     loads_.erase(index);
-}
-
-// Losses are compared so that NaN, which no comparison holds for, is beyond every limit.
-void OneWay::check_limits(const WindowRecord& window) const {
-  for (std::size_t k = 0; k < links_.size(); ++k) {
-    const auto check = [&](const char* what, double value, double limit) {
-      if (value <= limit) return;
-      const auto state =
-          fmt::format("mapping the window that ends at {:.6g} s", case_.time(complete_));
-      throw Failure(
-          case_.interfaces[k].text(), state,
-          fmt::format(
-              "{}: the mapping from {} lost {:.3g} of the {} in the window that ends at {:.6g} s; "
-              "coupling.limits.{}_loss = {:.3g}.",
-              case_.interfaces[k].at.text(), case_.interfaces[k].text(), value, what,
-              case_.time(complete_), what, limit),
-          Failure::Cause::limit);
-    };
-    check("force", window.ledger[k].loss.force, case_.limits.force_loss);
-    check("moment", window.ledger[k].loss.moment, case_.limits.moment_loss);
-  }
 }
 
 }  // namespace acopla::coupler

@@ -3,17 +3,13 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
+#include "coupler/account.h"
 #include "coupler/case.h"
 #include "coupler/crew.h"
-#include "coupler/mapping/mapping.h"
-#include "coupler/outcome.h"
-#include "coupler/quantities.h"
-#include "coupler/record.h"
-#include "coupler/reporter.h"
+#include "coupler/scheme.h"
 
 namespace acopla::coupler {
 
@@ -23,41 +19,24 @@ namespace acopla::coupler {
 /// What receivers get: `history` every window from loads_from on, with the mean force of that
 /// window; `mean` one window [at − over, at] with the mean over it; `snapshot` the last window
 /// before `at` alone.
-class OneWay {
+class OneWay final : public Scheme {
  public:
-  /// Builds the mappings. @throws io::UserError located at the interface whose surfaces do not
-  /// exist or do not meet
-  OneWay(const Case& read, Crew& crew, Record& record, Quantities& quantities, Reporter& reporter);
-
-  /// @throws Failure, also for a ledger beyond its limit; Interrupted
-  void run();
-
-  std::int64_t complete() const { return complete_; }  ///< windows recorded
-  const Ledgers& ledgers() const { return ledgers_; }
-  const std::vector<InterfaceOutcome>& interfaces() const { return interfaces_; }
+  OneWay(const Case& read, Crew& crew, Account& account);
+  void run() override;
 
  private:
-  struct Interface {
-    const InterfaceCase* about;
-    const geometry::SurfaceMesh *from, *to;  // to, mapping: null where the forces are recorded only
-    std::unique_ptr<Mapping> mapping;
-  };
   struct Receiver {
     std::int64_t next = 0;  // span to be begun
     std::int64_t answered = 0;
   };
 
-  void build(const InterfaceCase& interface);
   void begin_what_can_begin();
   void begin_receiver(const std::string& name, Receiver& receiver);
   void take(Crew::Answer answer);
   void map_forces(const std::string& sender, std::int64_t window, const protocol::Advance& advance);
-  void add_to_load(const Interface& interface, std::int64_t window,
-                   const std::vector<geometry::Vec3>& forces);
   void note_quantities(const Crew::Answer& answer, std::int64_t window);
   bool is_complete(std::int64_t window) const;
   void close_window();
-  void check_limits(const WindowRecord& window) const;
 
   std::int64_t span_count() const;
   std::pair<std::int64_t, std::int64_t> span(
@@ -66,10 +45,7 @@ class OneWay {
 
   const Case& case_;
   Crew& crew_;
-  Record& record_;
-  Quantities& quantities_;
-  Reporter& reporter_;
-  std::vector<Interface> links_;
+  Account& account_;
   std::map<std::string, std::int64_t>
       senders_;  // windows answered; participants without a surface are senders of nothing
   std::map<std::string, bool> sender_busy_;
@@ -77,10 +53,6 @@ class OneWay {
   std::map<std::int64_t, WindowRecord> open_;  // windows under way
   std::map<std::int64_t, std::map<std::string, std::vector<geometry::Vec3>>>
       loads_;  // span → "to" surface → forces
-  std::int64_t complete_ = 0;
-  Ledgers ledgers_;
-  std::vector<InterfaceOutcome> interfaces_;
-  std::chrono::steady_clock::time_point begin_;
 };
 
 }  // namespace acopla::coupler

@@ -25,7 +25,10 @@ struct Checked {
 /// Worst of all windows and interfaces.
 struct Ledgers {
   double force_loss = 0, moment_loss = 0;
-  double energy_made = 0;  ///< [J]; 0 by construction where nothing moves
+  double energy_made = 0;  ///< [J], of all windows; 0 by construction where nothing moves
+  std::int64_t iterations = 0;       ///< of all windows
+  std::int64_t most_iterations = 0;  ///< of one window
+  std::int64_t not_converged = 0;    ///< windows that were accepted all the same
   std::int64_t unmapped = 0;
   double worst_distance = 0;  ///< [m]
 };

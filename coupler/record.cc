@@ -56,6 +56,10 @@ void Record::write_ledger(const WindowRecord& window) {
     }
     series_->add_scalar(name + "force_loss", row.loss.force);
     series_->add_scalar(name + "moment_loss", row.loss.moment);
+    if (case_.scheme != SchemeKind::one_way) {
+      series_->add_scalar(name + "work_sent", row.work_sent);
+      series_->add_scalar(name + "work_received", row.work_received);
+    }
     force_loss = std::max(force_loss, row.loss.force);
     moment_loss = std::max(moment_loss, row.loss.moment);
     unmapped += mapping_[k].first;
@@ -65,7 +69,10 @@ void Record::write_ledger(const WindowRecord& window) {
   series_->add_scalar("ledger/moment_loss", moment_loss);
   series_->add_scalar("ledger/unmapped", static_cast<double>(unmapped));
   series_->add_scalar("ledger/worst_distance", worst_distance);
-  series_->add_scalar("ledger/energy_made", 0);
+  series_->add_scalar("ledger/energy_made", window.energy_made);
+  if (case_.scheme != SchemeKind::serial_implicit) return;
+  series_->add_scalar("ledger/iterations", static_cast<double>(window.iterations));
+  series_->add_scalar("ledger/residual", window.residual);
 }
 
 void Record::write_picture(std::int64_t index, const std::string& surface,

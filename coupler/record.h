@@ -2,6 +2,7 @@
 // surfaces.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -19,6 +20,9 @@ namespace acopla::coupler {
 struct LedgerRow {
   Resultant sent, received;  ///< about the centroid of the sending surface
   Loss loss;
+  /// Two-way: of the forces on the nodes that receive them, over the way the structure went, and over that of the surface that sent
+  /// them [J].
+  double work_received = 0, work_sent = 0;
 };
 
 /// Everything of one window, gathered until all participants are through it.
@@ -26,6 +30,10 @@ struct WindowRecord {
   std::vector<LedgerRow> ledger;                              ///< one per interface of the case
   std::map<std::string, std::vector<geometry::Vec3>> forces;  ///< "grains.box" → one per point [N]
   std::vector<std::pair<std::string, double>> quantities;     ///< "participant.quantity"
+  std::int64_t iterations = 0;  ///< implicit
+  double residual = 0;          ///< implicit: of the motion, over that of the window
+  bool converged = true;
+  double energy_made = 0;  ///< until the window's end [J]
 };
 
 class Record {

@@ -135,6 +135,8 @@ Message interface_message(const std::vector<Surface>& surfaces) {
     for (const auto kind : surface.mesh.kinds()) kinds.push_back(static_cast<std::uint8_t>(kind));
     const std::uint64_t faces = kinds.size();  // before the move: arguments have no order
     message.arrays.push_back(Array::of("kinds", surface.name, {faces}, std::move(kinds)));
+    if (!surface.displacement.empty()) message.arrays.push_back(vectors("displacement", surface.name, surface.displacement));
+    if (!surface.velocity.empty()) message.arrays.push_back(vectors("velocity", surface.name, surface.velocity));
   }
   message.body = {{"surfaces", names}};
   return message;
@@ -143,7 +145,7 @@ Message interface_message(const std::vector<Surface>& surfaces) {
 std::vector<Surface> read_interface(const Message& message) {
   std::vector<Surface> surfaces;
   for (const auto& name : value<std::vector<std::string>>(message, message.body, "surfaces")) {
-    Surface surface{name, {}};
+    Surface surface{name, {}, {}, {}};
     surface.mesh.points = vectors(array(message, "points", name));
     const auto nodes = array(message, "nodes", name).integers();
     std::size_t first = 0;
@@ -161,6 +163,12 @@ std::vector<Surface> read_interface(const Message& message) {
       first += count;
     }
     if (first != nodes.size()) throw ProtocolError(fmt::format("surface {} names more nodes than its faces need", name));
+    for (const auto& [field, values] : {std::pair{"displacement", &surface.displacement}, {"velocity", &surface.velocity}})
+      if (const auto* given = message.find(field, name)) {
+        *values = vectors(*given);
+        if (values->size() != surface.mesh.points.size())
+          throw ProtocolError(fmt::format("surface {} gives {} for {} of its {} points", name, field, values->size(), surface.mesh.points.size()));
+      }
     surfaces.push_back(std::move(surface));
   }
   return surfaces;

@@ -38,6 +38,8 @@ struct Run {
 struct Surface {
   std::string name;
   geometry::SurfaceMesh mesh;  ///< reference position
+  /// Where it is and how it moves when coupled time begins, per point [m], [m/s]; empty: at rest in its reference position.
+  std::vector<Eigen::Vector3d> displacement = {}, velocity = {};
 };
 
 /// A span of coupled time, in ticks and seconds.
@@ -48,8 +50,9 @@ struct Window {
   double end_time() const { return start_time + length; }
 };
 
-/// A value per point of a surface. `force` is the mean over the window [N]; `displacement` [m] and `velocity` [m/s] are
-/// those at the window's end.
+/// A value per point of a surface. `force` is the mean over the window [N]. Of what is sent, `displacement` [m] and `velocity` [m/s] are
+/// those at the window's end; of what is received, those at its start, and `end_displacement` and `end_velocity`, of an
+/// implicit scheme, those at its end.
 struct Field {
   std::string surface;
   std::string name;

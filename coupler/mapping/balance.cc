@@ -1,6 +1,7 @@
 #include "coupler/mapping/balance.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -56,8 +57,11 @@ Resultant resultant(std::span<const Vec3> points, std::span<const Vec3> forces, 
 }
 
 Loss loss(const Resultant& sent, const Resultant& received) {
+  // A single point sends no moment about itself, yet its force arrives on nodes around it.
+  const double turning_size =
+      sent.size > 0 ? std::max(sent.turning_size, received.turning_size) : sent.turning_size;
   return {fraction((sent.force - received.force).norm(), sent.size),
-          fraction((sent.moment - received.moment).norm(), sent.turning_size)};
+          fraction((sent.moment - received.moment).norm(), turning_size)};
 }
 
 }  // namespace acopla::coupler

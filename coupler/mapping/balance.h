@@ -27,7 +27,7 @@ Resultant resultant(std::span<const Vec3> points, std::span<const Vec3> forces, 
 /// sent.
 struct Loss {
   double force = 0;   ///< |ΔΣF| / Σ|F|
-  double moment = 0;  ///< |ΔΣM| / Σ|r||F|
+  double moment = 0;  ///< |ΔΣM| / Σ|r||F|, of the side where that is larger
 };
 
 /// Zero where nothing was sent and nothing received; infinite where something was received that

@@ -1,0 +1,151 @@
+#include "coupler/account.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "coupler/failure.h"
+
+namespace acopla::coupler {
+
+using geometry::Vec3;
+
+namespace {
+
+const std::vector<Vec3>& force_on(const protocol::Advance& advance, const std::string& surface) {
+  for (const auto& field : advance.fields)
+    if (field.surface == surface && field.name == "force") return field.values;
+  throw std::logic_error("a crew answer without its force");  // Crew refuses those
+}
+
+}  // namespace
+
+Account::Account(const Case& read, Crew& crew, Record& record, Quantities& quantities,
+                 Reporter& reporter)
+    : case_(read), crew_(crew), record_(record), quantities_(quantities), reporter_(reporter) {
+  for (const auto& interface : case_.interfaces) link(interface);
+}
+
+void Account::link(const InterfaceCase& interface) {
+  Link link{&interface, &crew_.surface(interface.from, interface.from_at), nullptr, nullptr};
+  if (interface.recorded_only()) {
+    record_.add_surface(interface.from.text(), *link.from);
+    record_.set_mapping(links_.size(), 0, 0);
+    interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
+    links_.push_back(std::move(link));
+    return;
+  }
+  link.to = &crew_.surface(interface.to, interface.to_at);
+  if (link.to->face_count() == 0)
+    throw io::UserError(interface.to_at, fmt::format("surface {} has no faces to receive forces.",
+                                                     interface.to.text()));
+  link.mapping =
+      std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance});
+  const auto& mapping = *link.mapping;
+  if (static_cast<std::int64_t>(mapping.unmapped()) > case_.limits.unmapped) {
+    const auto& point = link.from->points[mapping.unmapped_points().front()];
+    throw io::UserError(
+        interface.at,
+        fmt::format("{} of {} points of {} are farther than max_distance = {:.6g} m from {}, e.g. "
+                    "({:.6g}, {:.6g}, {:.6g}). "
+                    "Check that the surfaces stand in the same place and unit, raise "
+                    "coupling.max_distance, or allow that "
+                    "many in coupling.limits.unmapped.",
+                    mapping.unmapped(), link.from->points.size(), interface.from.text(),
+                    case_.max_distance, interface.to.text(), point[0], point[1], point[2]));
+  }
+  ledgers_.unmapped += static_cast<std::int64_t>(mapping.unmapped());
+  ledgers_.worst_distance = std::max(ledgers_.worst_distance, mapping.worst_distance());
+  record_.add_surface(interface.from.text(), *link.from);
+  record_.add_surface(interface.to.text(), *link.to);
+  record_.set_mapping(links_.size(), mapping.unmapped(), mapping.worst_distance());
+  interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
+  links_.push_back(std::move(link));
+}
+
+void Account::map_forces(const std::string& sender, const protocol::Advance& advance,
+                         WindowRecord& window,
+                         std::map<std::string, std::vector<Vec3>>& received) const {
+  window.ledger.resize(links_.size());
+  for (std::size_t k = 0; k < links_.size(); ++k) {
+    const auto& link = links_[k];
+    if (link.about->from.participant != sender) continue;
+    const auto& sent = force_on(advance, link.about->from.surface);
+    window.forces[link.about->from.text()] = sent;
+    const Vec3 centre = link.from->centroid();
+    auto& row = window.ledger[k];
+    row.sent = resultant(link.from->points, sent, centre);
+    if (!link.mapping) {
+      row.received = row.sent;
+      continue;
+    }
+    std::vector<Vec3> arrived(link.to->points.size());
+    link.mapping->forces(sent, arrived);
+    row.received = resultant(link.to->points, arrived, centre);
+    row.loss = loss(row.sent, row.received);
+    // Several interfaces may end on one surface.
+    auto& load = received[link.about->to.text()];
+    if (load.empty()) load.assign(arrived.size(), Vec3::Zero());
+    for (std::size_t n = 0; n < arrived.size(); ++n) load[n] += arrived[n];
+  }
+}
+
+void Account::begin() { begin_ = std::chrono::steady_clock::now(); }
+
+void Account::close(WindowRecord& window) {
+  window.ledger.resize(links_.size());
+  for (std::size_t k = 0; k < links_.size(); ++k) {
+    const auto& row = window.ledger[k];
+    auto& outcome = interfaces_[k];
+    outcome.sent = row.sent.force;
+    outcome.received = row.received.force;
+    outcome.loss = row.loss.force;
+    outcome.worst_loss = std::max(outcome.worst_loss, row.loss.force);
+    ledgers_.force_loss = std::max(ledgers_.force_loss, row.loss.force);
+    ledgers_.moment_loss = std::max(ledgers_.moment_loss, row.loss.moment);
+    ledgers_.energy_made += row.work_received - row.work_sent;
+  }
+  ledgers_.iterations += window.iterations;
+  ledgers_.most_iterations = std::max(ledgers_.most_iterations, window.iterations);
+  ledgers_.not_converged += window.converged ? 0 : 1;
+  window.energy_made = ledgers_.energy_made;
+  record_.write(complete_, window);
+  const double end = case_.time(complete_ + 1);
+  for (const auto& [name, value] : window.quantities) quantities_.add(name, end, value);
+  ++complete_;
+  const auto seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  reporter_.progress(complete_, case_.windows, end, seconds);
+  check_limits(window);
+}
+
+// Losses are compared so that NaN, which no comparison holds for, is beyond every limit.
+void Account::check_limits(const WindowRecord& window) const {
+  for (std::size_t k = 0; k < links_.size(); ++k) {
+    const auto check = [&](const char* what, double value, double limit) {
+      if (value <= limit) return;
+      const auto state =
+          fmt::format("mapping the window that ends at {:.6g} s", case_.time(complete_));
+      throw Failure(
+          case_.interfaces[k].text(), state,
+          fmt::format(
+              "{}: the mapping from {} lost {:.3g} of the {} in the window that ends at {:.6g} s; "
+              "coupling.limits.{}_loss = {:.3g}.",
+              case_.interfaces[k].at.text(), case_.interfaces[k].text(), value, what,
+              case_.time(complete_), what, limit),
+          Failure::Cause::limit);
+    };
+    check("force", window.ledger[k].loss.force, case_.limits.force_loss);
+    check("moment", window.ledger[k].loss.moment, case_.limits.moment_loss);
+  }
+  if (const auto limit = case_.limits.energy_made; limit && !(std::abs(window.energy_made) <= *limit))
+    throw Failure("coupler", "coupling",
+                  fmt::format("the coupling made {:.4g} J until {:.6g} s; coupling.limits.energy_made = {:.4g}. Shorten the window, or use "
+                              "scheme = \"implicit\".",
+                              window.energy_made, case_.time(complete_), *limit),
+                  Failure::Cause::limit);
+}
+
+}  // namespace acopla::coupler

@@ -1,0 +1,63 @@
+// The account of a run: its interfaces, and window by window what went through them and what was lost.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coupler/case.h"
+#include "coupler/crew.h"
+#include "coupler/mapping/mapping.h"
+#include "coupler/outcome.h"
+#include "coupler/quantities.h"
+#include "coupler/record.h"
+#include "coupler/reporter.h"
+
+namespace acopla::coupler {
+
+/// An interface with its surfaces and the mapping between them.
+struct Link {
+  const InterfaceCase* about;
+  const geometry::SurfaceMesh *from, *to;  ///< to, mapping: null where the forces are recorded only
+  std::unique_ptr<Mapping> mapping;
+};
+
+/// What every scheme keeps: it builds the mappings, and books each window once everybody is through it.
+class Account {
+ public:
+  /// @throws io::UserError located at the interface whose surfaces do not exist or do not meet
+  Account(const Case& read, Crew& crew, Record& record, Quantities& quantities, Reporter& reporter);
+
+  const std::vector<Link>& links() const { return links_; }
+  /// Maps what `sender` sent in a window onto the surfaces that receive it, which grow by it, and enters
+  /// both sides in the record. @param received  "to" surface → one force per node [N]
+  void map_forces(const std::string& sender, const protocol::Advance& advance, WindowRecord& window,
+                  std::map<std::string, std::vector<geometry::Vec3>>& received) const;
+
+  void begin();  ///< computing begins
+  /// Writes the next window, and compares it with the limits. @throws Failure beyond one
+  void close(WindowRecord& window);
+
+  std::int64_t complete() const { return complete_; }  ///< windows written
+  const Ledgers& ledgers() const { return ledgers_; }
+  const std::vector<InterfaceOutcome>& interfaces() const { return interfaces_; }
+
+ private:
+  void link(const InterfaceCase& interface);
+  void check_limits(const WindowRecord& window) const;
+
+  const Case& case_;
+  Crew& crew_;
+  Record& record_;
+  Quantities& quantities_;
+  Reporter& reporter_;
+  std::vector<Link> links_;
+  std::int64_t complete_ = 0;
+  Ledgers ledgers_;
+  std::vector<InterfaceOutcome> interfaces_;
+  std::chrono::steady_clock::time_point begin_;
+};
+
+}  // namespace acopla::coupler

@@ -1,0 +1,268 @@
+#include "coupler/two_way.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "coupler/failure.h"
+
+namespace acopla::coupler {
+
+using geometry::Vec3;
+
+namespace {
+
+double size_of(const std::vector<Vec3>& values) {
+  double square = 0;
+  for (const auto& value : values) square += value.squaredNorm();
+  return std::sqrt(square);
+}
+
+const std::vector<Vec3>& field_of(const protocol::Advance& advance, const std::string& surface, const char* name) {
+  for (const auto& field : advance.fields)
+    if (field.surface == surface && field.name == name) return field.values;
+  throw std::logic_error("a crew answer without a field that was asked for");  // Crew refuses those
+}
+
+// Nodal forces times nodal motion [J].
+double work(const std::vector<Vec3>& forces, const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
+  double sum = 0;
+  for (std::size_t k = 0; k < forces.size(); ++k) sum += forces[k].dot(to[k] - from[k]);
+  return sum;
+}
+
+}  // namespace
+
+TwoWay::TwoWay(const Case& read, Crew& crew, Account& account) : case_(read), crew_(crew), account_(account) {
+  for (const auto& participant : case_.participants) (case_.receives(participant.name) ? structures_ : loaders_).push_back(participant.name);
+  for (const auto& link : account_.links()) {
+    if (!link.mapping) continue;
+    const auto& initial = crew_.initial(link.about->to);
+    auto& motion = now_[link.about->to.text()];
+    const Vectors none(link.to->points.size(), Vec3::Zero());
+    motion.displacement = initial.displacement.empty() ? none : initial.displacement;
+    motion.velocity = initial.velocity.empty() ? none : initial.velocity;
+  }
+  if (case_.scheme == SchemeKind::serial_implicit) acceleration_ = make_acceleration(case_.implicit.acceleration);
+}
+
+void TwoWay::run() {
+  account_.begin();
+  for (window_ = 0; window_ < case_.windows; ++window_) {
+    WindowRecord window;
+    switch (case_.scheme) {
+      case SchemeKind::parallel_explicit: step_in_parallel(window); break;
+      case SchemeKind::serial_implicit: step_with_iterations(window); break;
+      default: step_serially(window);
+    }
+    account_.close(window);
+  }
+}
+
+void TwoWay::step_serially(WindowRecord& window) {
+  Forces forces;
+  Motions end;
+  begin_loaders(nullptr);
+  gather(loaders_.size(), window, forces, end);
+  begin_structures(forces);
+  gather(structures_.size(), window, forces, end);
+  book_work(window, window.forces, end, moved_on());
+  now_ = std::move(end);
+}
+
+void TwoWay::step_in_parallel(WindowRecord& window) {
+  Forces forces;
+  Motions end;
+  begin_structures(last_forces_);
+  begin_loaders(nullptr);
+  gather(loaders_.size() + structures_.size(), window, forces, end);
+  book_work(window, last_sent_, end, moved_on());
+  now_ = std::move(end);
+  last_sent_ = window.forces;
+  last_forces_ = std::move(forces);
+}
+
+void TwoWay::step_with_iterations(WindowRecord& window) {
+  const auto& settings = case_.implicit;
+  std::vector<std::string> everybody = loaders_;
+  everybody.insert(everybody.end(), structures_.begin(), structures_.end());
+  crew_.save(everybody);
+  acceleration_->begin_window();
+  auto assumed = flat(moved_on());
+  const auto start = flat(now_);
+  std::vector<double> residuals;
+  double force_change = 0;
+  Forces before;
+  for (int iteration = 1;; ++iteration) {
+    if (iteration > 1) crew_.restore(everybody);
+    window = {};
+    Forces forces;
+    Motions end;
+    const auto moved_to = unflat(assumed);
+    begin_loaders(&moved_to);
+    gather(loaders_.size(), window, forces, end);
+    begin_structures(forces);
+    gather(structures_.size(), window, forces, end);
+    window.iterations = iteration;
+    const auto answered = flat(end);
+
+    // Motion counts from the window's start, so that a tolerance means the same however far the structure has gone.
+    const double residual = (answered - assumed).norm(), moved = (answered - start).norm();
+    residuals.push_back(residual);
+    const bool motion_agrees = residual <= std::max(settings.relative * moved, settings.displacement);
+    bool forces_agree = true;
+    if (iteration > 1) {
+      double change = 0, size = 0;
+      for (const auto& [surface, values] : forces) {
+        Vectors difference = values;
+        for (std::size_t k = 0; k < values.size(); ++k) difference[k] -= before.at(surface)[k];
+        change = std::hypot(change, size_of(difference));
+        size = std::hypot(size, size_of(values));
+      }
+      force_change = size > 0 ? change / size : 0;
+      forces_agree = change <= std::max(settings.relative * size, settings.force);
+    }
+    window.residual = moved > 0 ? residual / moved : residual;
+    window.converged = motion_agrees && forces_agree;
+    if (!window.converged && iteration >= settings.most_iterations && settings.stops) give_up(residuals, force_change);
+    if (window.converged || iteration >= settings.most_iterations) {
+      acceleration_->end_window();
+      book_work(window, window.forces, end, moved_to);
+      now_ = std::move(end);
+      return;
+    }
+    assumed = acceleration_->next(assumed, answered);
+    before = std::move(forces);
+  }
+}
+
+void TwoWay::give_up(const std::vector<double>& residuals, double force_change) const {
+  const auto last = residuals.size() - 1;
+  const double ratio = last > 0 ? residuals[last] / residuals[last - 1] : 1, overall = residuals[last] / residuals[0];
+  int rises = 0;
+  for (std::size_t k = 1; k < residuals.size(); ++k) rises += residuals[k] > residuals[k - 1];
+  const char* how = overall > 1                                        ? "grows: the coupling is stronger than the relaxation; lower relaxation, or shorten the window"
+                    : 3 * rises > static_cast<int>(residuals.size())   ? "goes up and down: contacts may open and close between iterations; shorten the window, or lower relaxation"
+                    : ratio > 0.8                                      ? "creeps: try acceleration = \"iqn-ils\" with reuse = 5, or a larger relaxation"
+                                                                       : "falls steadily: raise max_iterations";
+  throw Failure("coupler", "iterating",
+                fmt::format("the window from {:.6g} s to {:.6g} s did not converge in {} iterations: the motion's residual went from {:.3g} to {:.3g} m and {}. "
+                            "(The forces last changed by {:.2g} of themselves.) on_fail = \"accept\" goes on all the same.",
+                            case_.time(window_), case_.time(window_ + 1), residuals.size(), residuals.front(), residuals.back(), how, force_change),
+                Failure::Cause::limit);
+}
+
+// Where the loaders' surfaces go by themselves: on with their velocity.
+TwoWay::Motions TwoWay::moved_on() const {
+  auto motions = now_;
+  for (auto& [surface, motion] : motions)
+    for (std::size_t k = 0; k < motion.displacement.size(); ++k) motion.displacement[k] += case_.window * motion.velocity[k];
+  return motions;
+}
+
+TwoWay::Motion TwoWay::carried(const Link& link, const Motions& motions) const {
+  const auto& motion = motions.at(link.about->to.text());
+  Motion result{Vectors(link.from->points.size()), Vectors(link.from->points.size())};
+  link.mapping->conjugate_values(motion.displacement, result.displacement);
+  link.mapping->conjugate_values(motion.velocity, result.velocity);
+  return result;
+}
+
+void TwoWay::begin_loaders(const Motions* end) {
+  for (const auto& name : loaders_) {
+    std::vector<protocol::Field> fields;
+    for (const auto& link : account_.links()) {
+      if (!link.mapping || link.about->from.participant != name) continue;
+      const auto& surface = link.about->from.surface;
+      auto start = carried(link, now_);
+      fields.push_back({surface, "displacement", std::move(start.displacement)});
+      fields.push_back({surface, "velocity", std::move(start.velocity)});
+      if (!end) continue;
+      auto stop = carried(link, *end);
+      fields.push_back({surface, "end_displacement", std::move(stop.displacement)});
+      fields.push_back({surface, "end_velocity", std::move(stop.velocity)});
+    }
+    crew_.begin_advance(name, window_, window_ + 1, std::move(fields));
+  }
+}
+
+void TwoWay::begin_structures(const Forces& forces) {
+  for (const auto& name : structures_) {
+    std::vector<protocol::Field> fields;
+    for (const auto& [surface, motion] : now_) {
+      const auto dot = surface.find('.');
+      if (surface.substr(0, dot) != name) continue;
+      const auto found = forces.find(surface);
+      fields.push_back({surface.substr(dot + 1), "force", found != forces.end() ? found->second : Vectors(motion.displacement.size(), Vec3::Zero())});
+    }
+    crew_.begin_advance(name, window_, window_ + 1, std::move(fields));
+  }
+}
+
+// So many answers, in any order; sums do not depend on it, since the account maps loader by loader.
+void TwoWay::gather(std::size_t answers, WindowRecord& window, Forces& forces, Motions& motions) {
+  std::map<std::string, protocol::Advance> came;
+  for (std::size_t k = 0; k < answers; ++k) {
+    auto answer = crew_.next_answer();
+    came[answer.participant] = std::move(answer.advance);
+  }
+  for (const auto& [name, advance] : came) {
+    for (const auto& [quantity, value] : advance.quantities) window.quantities.emplace_back(name + "." + quantity, value);
+    if (!case_.receives(name)) {
+      account_.map_forces(name, advance, window, forces);
+      continue;
+    }
+    for (const auto& [surface, motion] : now_) {
+      const auto dot = surface.find('.');
+      if (surface.substr(0, dot) != name) continue;
+      motions[surface] = {field_of(advance, surface.substr(dot + 1), "displacement"), field_of(advance, surface.substr(dot + 1), "velocity")};
+    }
+  }
+  for (const auto& [surface, values] : forces) window.forces[surface] = values;
+}
+
+// What the coupling makes: the work of the forces on the structure, less that on the surface that sent them, which went another way or,
+// in parallel, felt others. With `conjugate_values` the two are the same for the same motion, on surfaces that do not coincide too.
+void TwoWay::book_work(WindowRecord& window, const Forces& acting, const Motions& end, const Motions& moved_to) const {
+  for (std::size_t k = 0; k < account_.links().size(); ++k) {
+    const auto& link = account_.links()[k];
+    if (!link.mapping) continue;
+    const auto from = link.about->from.text(), to = link.about->to.text();
+    auto& row = window.ledger[k];
+    Vectors arrived(link.to->points.size());
+    link.mapping->forces(window.forces.at(from), arrived);
+    row.work_sent = work(arrived, now_.at(to).displacement, moved_to.at(to).displacement);
+    const auto found = acting.find(from);
+    if (found == acting.end()) continue;  // nothing acted yet
+    link.mapping->forces(found->second, arrived);
+    row.work_received = work(arrived, now_.at(to).displacement, end.at(to).displacement);
+  }
+}
+
+Eigen::VectorXd TwoWay::flat(const Motions& motions) const {
+  std::size_t size = 0;
+  for (const auto& [surface, motion] : motions) size += 6 * motion.displacement.size();
+  Eigen::VectorXd values(static_cast<Eigen::Index>(size));
+  Eigen::Index at = 0;
+  for (const auto& [surface, motion] : motions)
+    for (std::size_t k = 0; k < motion.displacement.size(); ++k, at += 6) {
+      values.segment<3>(at) = motion.displacement[k];
+      values.segment<3>(at + 3) = case_.window * motion.velocity[k];
+    }
+  return values;
+}
+
+TwoWay::Motions TwoWay::unflat(const Eigen::VectorXd& values) const {
+  auto motions = now_;
+  Eigen::Index at = 0;
+  for (auto& [surface, motion] : motions)
+    for (std::size_t k = 0; k < motion.displacement.size(); ++k, at += 6) {
+      motion.displacement[k] = values.segment<3>(at);
+      motion.velocity[k] = values.segment<3>(at + 3) / case_.window;
+    }
+  return motions;
+}
+
+}  // namespace acopla::coupler

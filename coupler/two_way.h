@@ -1,0 +1,67 @@
+// Two-way coupling: forces load the structures, whose motion moves the surfaces that sent them.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coupler/acceleration/acceleration.h"
+#include "coupler/account.h"
+#include "coupler/case.h"
+#include "coupler/crew.h"
+#include "coupler/scheme.h"
+
+namespace acopla::coupler {
+
+/// Loaders send forces and are moved; structures are loaded and send their motion. A window of length Δt from t_n, with the motion (u, v)
+/// of the structures' surfaces:
+///
+/// - explicit: the loaders begin at u_n and move on with v_n; the structures get the mean of their forces. Order 2.
+/// - parallel: the same, but both sides compute at once: the structures get the forces of the window before. Order 1, and unstable unless
+///   the structure damps, so it is refused unless the case insists.
+/// - implicit: the loaders move from (u_n, v_n) to an assumed (u_{n+1}, v_{n+1}), which is bettered until what the structures answer is the
+///   same within the tolerances. Everybody returns to the window's start before each iteration but the first.
+class TwoWay final : public Scheme {
+ public:
+  /// @throws io::UserError where nobody answers, or a surface would be moved by two
+  TwoWay(const Case& read, Crew& crew, Account& account);
+  void run() override;
+
+ private:
+  using Vectors = std::vector<geometry::Vec3>;
+  /// Of one surface at one instant, in the order of its points.
+  struct Motion {
+    Vectors displacement, velocity;  ///< [m], [m/s]
+  };
+  using Motions = std::map<std::string, Motion>;  // of the structures' surfaces, "structure.inside"
+  using Forces = std::map<std::string, Vectors>;  // on them [N]
+
+  void step_serially(WindowRecord& window);
+  void step_in_parallel(WindowRecord& window);
+  void step_with_iterations(WindowRecord& window);
+
+  void begin_loaders(const Motions* end);
+  void begin_structures(const Forces& forces);
+  void gather(std::size_t answers, WindowRecord& window, Forces& forces, Motions& motions);
+  void book_work(WindowRecord& window, const Forces& acting, const Motions& end, const Motions& moved_to) const;
+  Motions moved_on() const;
+  Motion carried(const Link& link, const Motions& motions) const;
+  void give_up(const std::vector<double>& residuals, double force_change) const;
+
+  Eigen::VectorXd flat(const Motions& motions) const;
+  Motions unflat(const Eigen::VectorXd& values) const;
+
+  const Case& case_;
+  Crew& crew_;
+  Account& account_;
+  std::vector<std::string> loaders_, structures_;
+  Motions now_;          // at the present window's start
+  Forces last_forces_;   // parallel: on the structures, of the window before
+  Forces last_sent_;     // parallel: by the surfaces that sent them
+  std::unique_ptr<Acceleration> acceleration_;  // implicit only
+  std::int64_t window_ = 0;
+};
+
+}  // namespace acopla::coupler

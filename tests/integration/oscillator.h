@@ -1,0 +1,132 @@
+// Two masses on three springs, split into two participants: mass 1 with its wall's spring and the spring between them sends the force that
+// this spring exerts on mass 2; mass 2 with its own wall's spring answers with its motion.
+//
+//   wall –k– (m1) –κ– (m2) –k– wall      m = 1 kg, k = 4π² N/m, κ = 16π² N/m, at rest at u = (1, 0) m
+//
+// The masses swing in phase at 1 Hz and against each other at 3 Hz: u = ½ (cos 2πt ± cos 6πt).
+#pragma once
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "protocol/participant.h"
+
+namespace acopla::oscillator {
+
+using geometry::Vec3;
+
+inline constexpr double pi = std::numbers::pi;
+inline constexpr double mass = 1, wall_spring = 4 * pi * pi, middle_spring = 16 * pi * pi;
+
+inline double exact(int which, double t) { return 0.5 * (std::cos(2 * pi * t) + (which == 1 ? 1 : -1) * std::cos(6 * pi * t)); }
+
+inline const std::vector<Vec3>* field(const std::vector<protocol::Field>& fields, const char* name) {
+  for (const auto& each : fields)
+    if (each.name == name) return &each.values;
+  return nullptr;
+}
+
+/// Mass 1. As particles do, it takes many steps in a window, and follows the surface of the other where it is told that it moves.
+class Loader final : public protocol::Participant {
+ public:
+  int steps = 32;              ///< of the classic Runge–Kutta method in a window: exact beside the coupling's error
+  double stiffness = middle_spring, wall = wall_spring, own_mass = mass;
+  bool only_pushes = false;    ///< a contact: no force where the spring is longer than unstrained
+  double gap = 0;              ///< [m], of the contact
+  double u = 1, v = 0;         ///< [m], [m/s]
+
+  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save"}}; }
+  std::vector<protocol::Surface> start(const protocol::Run&) override {
+    geometry::SurfaceMesh mesh;
+    mesh.points.emplace_back(1.0 / 3, 1.0 / 3, 0);
+    return {{"spring", mesh, {}, {}}};
+  }
+  protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override {
+    const double h = window.length, d0 = (*field(received, "displacement"))[0][0], v0 = (*field(received, "velocity"))[0][0];
+    const auto *d_end = field(received, "end_displacement"), *v_end = field(received, "end_velocity");
+    // A straight line from the window's start; or, between both ends, Hermite's cubic.
+    const auto other = [&](double s) {
+      if (!d_end) return d0 + s * h * v0;
+      const double d1 = (*d_end)[0][0], v1 = (*v_end)[0][0];
+      return d0 * (1 + s * s * (2 * s - 3)) + d1 * s * s * (3 - 2 * s) + h * (v0 * s * (s - 1) * (s - 1) + v1 * s * s * (s - 1));
+    };
+    const auto force = [&](double own, double s) {
+      const double stretch = own - other(s) - gap;
+      return only_pushes && stretch < 0 ? 0 : stiffness * stretch;  // on mass 2
+    };
+    const auto acceleration = [&](double own, double s) { return (-wall * own - force(own, s)) / own_mass; };
+    double impulse = 0;
+    const double dt = h / steps, ds = 1.0 / steps;
+    for (int n = 0; n < steps; ++n) {
+      const double s = n * ds, middle = s + ds / 2;
+      const double a1 = acceleration(u, s), u2 = u + dt / 2 * v, v2 = v + dt / 2 * a1;
+      const double a2 = acceleration(u2, middle), u3 = u + dt / 2 * v2, v3 = v + dt / 2 * a2;
+      const double a3 = acceleration(u3, middle), u4 = u + dt * v3, v4 = v + dt * a3;
+      const double a4 = acceleration(u4, s + ds);
+      const double f = (force(u, s) + 2 * force(u2, middle) + 2 * force(u3, middle) + force(u4, s + ds)) / 6;
+      impulse += dt * f;
+      u += dt / 6 * (v + 2 * v2 + 2 * v3 + v4);
+      v += dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+    }
+    history.push_back(u);
+    protocol::Advance result;
+    result.steps = static_cast<std::uint64_t>(steps);
+    result.fields.push_back({"spring", "force", {Vec3(impulse / h, 0, 0)}});
+    result.quantities = {{"u", u}, {"v", v}};
+    return result;
+  }
+  void save() override { saved_ = {u, v, static_cast<double>(history.size())}; }
+  void restore() override {
+    u = saved_[0], v = saved_[1];
+    history.resize(static_cast<std::size_t>(saved_[2]));
+  }
+
+  std::vector<double> history;  ///< u at the end of each window
+
+ private:
+  Vec3 saved_;
+};
+
+/// Mass 2: the trapezoidal rule under the mean force of the window, its acceleration anew from that force.
+class Structure final : public protocol::Participant {
+ public:
+  double u = 0, v = 0, own_mass = mass, wall = wall_spring;
+
+  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save"}}; }
+  std::vector<protocol::Surface> start(const protocol::Run&) override {
+    geometry::SurfaceMesh mesh;
+    mesh.points = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
+    mesh.add_face(geometry::FaceKind::triangle3, std::vector<std::uint32_t>{0, 1, 2});
+    return {{"mass", mesh, std::vector<Vec3>(3, Vec3(u, 0, 0)), std::vector<Vec3>(3, Vec3(v, 0, 0))}};
+  }
+  protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override {
+    double f = 0;
+    for (const auto& value : *field(received, "force")) f += value[0];
+    const double h = window.length, a = (f - wall * u) / own_mass;
+    // u' = u + h v + h²/4 (a + a'), a' = (f − k u')/m
+    const double next = (u + h * v + h * h / 4 * (a + f / own_mass)) / (1 + h * h / 4 * wall / own_mass);
+    v += h / 2 * (a + (f - wall * next) / own_mass);
+    u = next;
+    history.push_back(u);
+    velocities.push_back(v);
+    protocol::Advance result;
+    result.steps = 1;
+    result.fields = {{"mass", "displacement", std::vector<Vec3>(3, Vec3(u, 0, 0))}, {"mass", "velocity", std::vector<Vec3>(3, Vec3(v, 0, 0))}};
+    result.quantities = {{"u", u}, {"v", v}};
+    return result;
+  }
+  void save() override { saved_ = {u, v, static_cast<double>(history.size())}; }
+  void restore() override {
+    u = saved_[0], v = saved_[1];
+    history.resize(static_cast<std::size_t>(saved_[2]));
+    velocities.resize(history.size());
+  }
+
+  std::vector<double> history, velocities;  ///< at the end of each window
+
+ private:
+  Vec3 saved_;
+};
+
+}  // namespace acopla::oscillator

@@ -1,0 +1,260 @@
+// Two-way schemes on two masses and three springs, in one process: orders, agreement, energy, and what is said where they fail.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "coupler/coupler.h"
+#include "protocol/serve.h"
+#include "tests/integration/oscillator.h"
+
+namespace acopla {
+namespace {
+
+using coupler::Outcome;
+using coupler::Status;
+
+std::string case_text(double window, double end, const std::string& coupling) {
+  return fmt::format(R"(
+title = "two masses"
+dimension = 3
+end = {}
+[coupling]
+window = {}
+max_distance = 0.1
+{}
+[[coupling.interface]]
+from = "first.spring"
+to = "second.mass"
+[first]
+command = ["a"]
+[second]
+command = ["b"]
+)", end, window, coupling);
+}
+
+class Ear : public coupler::Reporter {
+ public:
+  void ready(const std::string&) override {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+    changed_.notify_all();
+  }
+  void wait() {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::seconds(10), [this] { return open_; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool open_ = false;
+};
+
+// Runs a case with these two participants in threads.
+Outcome run(const std::string& text, protocol::Participant& first, protocol::Participant& second) {
+  static int runs = 0;
+  zmq::context_t context;
+  const auto endpoint = fmt::format("inproc://two-way-{}", ++runs);
+  Ear ear;
+  const auto serve = [&](protocol::Participant& participant, const char* name) {
+    return std::thread([&, name] {
+      ear.wait();
+      try {
+        protocol::serve(participant, {endpoint, name, std::chrono::milliseconds(3000), &context});
+      } catch (const std::exception&) {  // the coupler's outcome says it too
+      }
+    });
+  };
+  const auto read = coupler::read_case(io::Table::from_text(text, "case.toml"));
+  auto one = serve(first, "first"), two = serve(second, "second");
+  Outcome outcome;
+  try {
+    outcome = coupler::Coupler(context, read, {endpoint, ""}, ear).run();
+  } catch (const std::exception& error) {
+    ADD_FAILURE() << error.what();
+  }
+  one.join();
+  two.join();
+  return outcome;
+}
+
+struct Swing {
+  oscillator::Loader first;
+  oscillator::Structure second;
+  Outcome outcome;
+  // Root mean square over both masses and all windows [m].
+  double error(double window) const {
+    double square = 0;
+    for (std::size_t k = 0; k < second.history.size(); ++k) {
+      const double t = window * static_cast<double>(k + 1);
+      square += std::pow(first.history[k] - oscillator::exact(1, t), 2) + std::pow(second.history[k] - oscillator::exact(2, t), 2);
+    }
+    return std::sqrt(square / 2 / static_cast<double>(second.history.size()));
+  }
+};
+
+Swing swing(double window, double end, const std::string& coupling) {
+  Swing swing;
+  swing.outcome = run(case_text(window, end, coupling), swing.first, swing.second);
+  EXPECT_EQ(swing.outcome.status, Status::met) << (swing.outcome.error ? swing.outcome.error->message : "");
+  return swing;
+}
+
+double order(double end, const std::string& coupling, double window) {
+  return std::log2(swing(window, end, coupling).error(window) / swing(window / 2, end, coupling).error(window / 2));
+}
+
+const char* const serial = "scheme = \"explicit\"";
+const char* const parallel = "scheme = \"parallel\"\nallow_unstable_scheme = true";
+const char* const implicit = "scheme = \"implicit\"\ntolerance = 1e-11";
+
+TEST(TwoWay, TheStaggeredSchemeIsOfSecondOrder) { EXPECT_NEAR(order(1, serial, 1.0 / 128), 2, 0.1); }
+TEST(TwoWay, TheParallelSchemeIsOfFirstOrder) { EXPECT_NEAR(order(1, parallel, 1.0 / 1024), 1, 0.1); }
+TEST(TwoWay, TheImplicitSchemeIsOfSecondOrder) { EXPECT_NEAR(order(1, implicit, 1.0 / 64), 2, 0.1); }
+
+// What the iterations converge to is the scheme's affair, and not the acceleration's.
+TEST(TwoWay, AllAccelerationsReachTheSameSolution) {
+  const double window = 1.0 / 32;
+  const auto reference = swing(window, 1, std::string(implicit) + "\nacceleration = \"iqn-ils\"");
+  for (const char* other : {"acceleration = \"aitken\"", "acceleration = \"constant\"\nrelaxation = 0.9\nmax_iterations = 200",
+                            "acceleration = \"iqn-ils\"\nreuse = 8", "acceleration = \"iqn-ils\"\nrelaxation = 0.1"}) {
+    const auto same = swing(window, 1, std::string(implicit) + "\n" + other);
+    ASSERT_EQ(same.second.history.size(), reference.second.history.size());
+    for (std::size_t k = 0; k < reference.second.history.size(); ++k) {
+      // 32 windows, each within 1e-11 of its motion of some tenths of a metre.
+      EXPECT_NEAR(same.second.history[k], reference.second.history[k], 1e-10) << other;
+      EXPECT_NEAR(same.first.history[k], reference.first.history[k], 1e-10) << other;
+    }
+  }
+}
+
+// The monolithic solution: both masses in one system, mass 1 as finely as here, mass 2 by the trapezoidal rule over the window under the mean of the
+// spring's force, solved for (u', v') of mass 2 by Newton with differences, which a linear system ends in one step.
+TEST(TwoWay, ImplicitReachesTheMonolithicSolution) {
+  const double h = 1.0 / 16;
+  const auto coupled = swing(h, 1, implicit);
+  oscillator::Loader first;
+  oscillator::Structure second;
+  const auto window_of = [&](int n) { return protocol::Window{n, n + 1, n * h, h}; };
+  for (int n = 0; n < 16; ++n) {
+    const auto answer = [&](const Eigen::Vector2d& end, bool keep) {
+      auto a = first;
+      auto b = second;
+      const auto vector = [](double value) { return std::vector<geometry::Vec3>{geometry::Vec3(value, 0, 0)}; };
+      const auto sent = a.advance(window_of(n), {{"spring", "displacement", vector(b.u)}, {"spring", "velocity", vector(b.v)},
+                                                 {"spring", "end_displacement", vector(end[0])}, {"spring", "end_velocity", vector(end[1])}});
+      b.advance(window_of(n), {{"mass", "force", sent.fields[0].values}});
+      const Eigen::Vector2d next(b.u, b.v);
+      if (keep) first = a, second = b;
+      return Eigen::Vector2d(next - end);
+    };
+    const Eigen::Vector2d guess(second.u, second.v), residual = answer(guess, false);
+    Eigen::Matrix2d slope;
+    slope << answer(guess + Eigen::Vector2d(1, 0), false) - residual, answer(guess + Eigen::Vector2d(0, 1), false) - residual;
+    answer(guess - slope.inverse() * residual, true);
+    EXPECT_NEAR(second.u, coupled.second.history[static_cast<std::size_t>(n)], 1e-10);
+    EXPECT_NEAR(first.u, coupled.first.history[static_cast<std::size_t>(n)], 1e-10);
+  }
+}
+
+// A lagged force feeds the swing; the mean force of the same window does not (over a hundred periods, and 12 windows in one of the faster swing).
+TEST(TwoWay, TheStaggeredSchemeKeepsTheEnergyThatTheParallelOneMakes) {
+  const double window = 1.0 / 128;
+  const auto energy = [](const Swing& s) {
+    using namespace oscillator;
+    return 0.5 * mass * (s.first.v * s.first.v + s.second.v * s.second.v) +
+           0.5 * wall_spring * (s.first.u * s.first.u + s.second.u * s.second.u) + 0.5 * middle_spring * std::pow(s.first.u - s.second.u, 2);
+  };
+  const double start = 0.5 * (oscillator::wall_spring + oscillator::middle_spring);
+  EXPECT_NEAR(energy(swing(window, 10, serial)) / start, 1, 0.05);
+  EXPECT_GT(energy(swing(window, 10, parallel)) / start, 2);
+}
+
+// Before the first contact nothing is exchanged but zeros, which no acceleration must stumble over.
+TEST(TwoWay, AContactThatBeginsLateIsMetByEveryAcceleration) {
+  for (const char* acceleration : {"iqn-ils", "aitken", "constant"}) {
+    Swing s;
+    s.first.only_pushes = true;
+    s.first.gap = 0.5;
+    s.first.wall = 0;
+    s.first.u = 0;
+    s.first.v = 1;  // [m/s]: it meets mass 2, at rest, after half a second
+    s.second.wall = 0;
+    s.outcome = run(case_text(1.0 / 64, 1.5, fmt::format("{}\nacceleration = \"{}\"", "scheme = \"implicit\"\ntolerance = 1e-9", acceleration)), s.first, s.second);
+    ASSERT_EQ(s.outcome.status, Status::met) << acceleration << s.outcome.error->message;
+    EXPECT_EQ(s.second.history[30], 0);
+    // Equal masses exchange their velocities; momentum is kept as the tolerance allows.
+    EXPECT_NEAR(s.first.v + s.second.v, 1, 1e-8) << acceleration;
+    EXPECT_NEAR(s.second.v, 1, 0.02) << acceleration;
+  }
+}
+
+TEST(TwoWay, TheEnergyThatTheCouplingMadeIsBookedAndLimited) {
+  const auto explicitly = swing(1.0 / 64, 1, serial), implicitly = swing(1.0 / 64, 1, implicit);
+  EXPECT_GT(std::abs(explicitly.outcome.ledgers.energy_made), 1e-3);
+  EXPECT_LT(std::abs(implicitly.outcome.ledgers.energy_made), 1e-8);
+  oscillator::Loader first;
+  oscillator::Structure second;
+  const auto stopped = run(case_text(1.0 / 64, 1, std::string(serial) + "\nlimits = { energy_made = 1e-6 }"), first, second);
+  ASSERT_TRUE(stopped.error);
+  EXPECT_NE(stopped.error->message.find("coupling.limits.energy_made"), std::string::npos) << stopped.error->message;
+  EXPECT_EQ(stopped.exit_code, 3);
+}
+
+TEST(TwoWay, AWindowThatDoesNotConvergeSaysHow) {
+  const auto message = [](const std::string& coupling, double second_mass = 1) {
+    oscillator::Loader first;
+    oscillator::Structure second;
+    second.own_mass = second_mass;
+    const auto outcome = run(case_text(1.0 / 16, 1, coupling), first, second);
+    return outcome.error ? outcome.error->message : "";
+  };
+  EXPECT_NE(message("scheme = \"implicit\"\nacceleration = \"constant\"\nrelaxation = 0.01\nmax_iterations = 5").find("creeps"), std::string::npos);
+  // A light mass behind a stiff spring: the answer overshoots, each time more.
+  const auto grows = message("scheme = \"implicit\"\nacceleration = \"constant\"\nrelaxation = 1\nmax_iterations = 9", 0.01);
+  EXPECT_NE(grows.find("grows"), std::string::npos) << grows;
+  Swing accepted;
+  accepted.outcome = run(case_text(1.0 / 16, 1, "scheme = \"implicit\"\nacceleration = \"constant\"\nrelaxation = 0.01\nmax_iterations = 5\non_fail = \"accept\""),
+                         accepted.first, accepted.second);
+  EXPECT_EQ(accepted.outcome.status, Status::met);
+  EXPECT_EQ(accepted.outcome.ledgers.not_converged, 16);
+}
+
+TEST(TwoWay, WhatTheCaseAsksWronglyIsSaid) {
+  const auto refusal = [](const std::string& coupling) -> std::string {
+    try {
+      coupler::read_case(io::Table::from_text(case_text(0.1, 1, coupling), "case.toml"));
+    } catch (const io::UserError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(refusal("scheme = \"parallel\"").find("allow_unstable_scheme"), std::string::npos);
+  EXPECT_NE(refusal("scheme = \"explicit\"\nmax_iterations = 3").find("\"implicit\" only"), std::string::npos);
+  EXPECT_NE(refusal("scheme = \"implicit\"\nrelaxation = 0").find("relaxation"), std::string::npos);
+  EXPECT_NE(refusal("scheme = \"explicit\"\nloads = \"mean\"").find("\"one-way\" only"), std::string::npos);
+  EXPECT_NE(refusal("scheme = \"implicit\"\ntolerance = { relative = 0 }").find("both displacement"), std::string::npos);
+}
+
+TEST(TwoWay, WhoCannotReturnIsRefusedForImplicitAtOnce) {
+  class Forward final : public protocol::Participant {
+   public:
+    oscillator::Structure inner;
+    protocol::Introduction introduce() const override { return {"forward", 3, {}}; }
+    std::vector<protocol::Surface> start(const protocol::Run& run) override { return inner.start(run); }
+    protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& fields) override { return inner.advance(window, fields); }
+  } second;
+  oscillator::Loader first;
+  const auto outcome = run(case_text(0.1, 1, implicit), first, second);
+  ASSERT_TRUE(outcome.error);
+  EXPECT_EQ(outcome.error->participant, "second");
+  EXPECT_NE(outcome.error->message.find("cannot return to the start of a window"), std::string::npos) << outcome.error->message;
+}
+
+}  // namespace
+}  // namespace acopla
