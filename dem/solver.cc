@@ -40,8 +40,9 @@ void Solver::check_uses(const protocol::Run& run) {
     if (!use.sends.empty()) sent_.push_back(wall);
     if (use.receives.empty()) continue;
     for (const auto& field : use.receives)
-      if (field != "displacement" && field != "velocity")
-        throw io::UserError(fmt::format("{}.{} cannot receive {}: it receives displacement and velocity.", scene_.name, use.surface, field));
+      if (field != "displacement" && field != "velocity" && field != "end_displacement" && field != "end_velocity")
+        throw io::UserError(fmt::format("{}.{} cannot receive {}: it receives displacement and velocity, at a window's start and end.", scene_.name,
+                                        use.surface, field));
     if (scene_.walls[wall].motion.moves())
       throw io::UserError(fmt::format("{}.{} is moved by the coupled solver and has a motion of its own. Remove its motion.", scene_.name, use.surface));
     scene_.walls[wall].motion = Motion::prescribed();
@@ -144,14 +145,22 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
   return result;
 }
 
-void Solver::prescribe(const protocol::Window&, const std::vector<protocol::Field>& received) {
+void Solver::prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received) {
   for (const auto wall : received_) {
-    const std::vector<Vec3>*displacement = nullptr, *velocity = nullptr;
-    for (const auto& field : received)
-      if (field.surface == scene_.walls[wall].name) (field.name == "velocity" ? velocity : displacement) = &field.values;
+    const auto given = [&](const char* name) -> const std::vector<Vec3>* {
+      for (const auto& field : received)
+        if (field.surface == scene_.walls[wall].name && field.name == name) return &field.values;
+      return nullptr;
+    };
+    const auto* const displacement = given("displacement");
     if (!displacement) continue;  // nothing was said: the wall stays
     const std::vector<Vec3> still(displacement->size(), Vec3::Zero());
-    engine_->walls().prescribe(wall, *displacement, velocity ? *velocity : still, engine_->time());
+    const auto or_still = [&](const std::vector<Vec3>* velocity) { return std::span<const Vec3>(velocity ? *velocity : still); };
+    const auto* const end = given("end_displacement");
+    if (!end) engine_->walls().prescribe(wall, *displacement, or_still(given("velocity")), engine_->time());
+    else
+      engine_->walls().prescribe(wall, {*displacement, or_still(given("velocity"))}, {*end, or_still(given("end_velocity"))}, engine_->time(),
+                                 window.length);
   }
 }
 

@@ -506,7 +506,10 @@ void WallSet::move(double time, double step) {
   time_ = time;
   for (const auto w : movers_) {
     const auto& motion = walls_[w].motion;
-    if (motion.kind() == Motion::Kind::prescribed) continue;
+    if (motion.kind() == Motion::Kind::prescribed) {
+      if (!prescribed_[w].curve.empty()) follow_curve(prescribed_[w]);
+      continue;
+    }
     if (motion.kind() != Motion::Kind::servo) {
       place(w, motion.at(time));
       continue;
@@ -616,6 +619,40 @@ void WallSet::prescribe(std::size_t wall, std::span<const Vec3> displacements, s
   prescribed.start = prescribed.travel_time = time;
   prescribed.travel = std::sqrt(farthest);
   prescribed.fastest = std::sqrt(fastest);
+  prescribed.curve.clear();
+}
+
+void WallSet::prescribe(std::size_t wall, const Instant& start, const Instant& end, double time, double length) {
+  prescribe(wall, start.displacements, start.velocities, time);
+  auto& prescribed = prescribed_[wall];
+  const auto count = prescribed.position.size();
+  if (end.displacements.size() != count || end.velocities.size() != count || !(length > 0))
+    throw std::logic_error("the end of a window is prescribed for every vertex, and after its start");
+  prescribed.curve.resize(4 * count);
+  prescribed.curve_start = time;
+  prescribed.curve_length = length;
+  double fastest = prescribed.fastest * prescribed.fastest;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec3 way = end.displacements[k] - start.displacements[k], first = length * start.velocities[k], last = length * end.velocities[k];
+    Vec3* const curve = &prescribed.curve[4 * k];
+    curve[0] = prescribed.position[k];
+    curve[1] = first;
+    curve[2] = 3 * way - 2 * first - last;
+    curve[3] = first + last - 2 * way;
+    // The velocity is a parabola within the triangle of its Bézier points.
+    fastest = std::max({fastest, end.velocities[k].squaredNorm(), ((3 * way - first - last) / length).squaredNorm()});
+  }
+  prescribed.fastest = std::sqrt(fastest);
+}
+
+void WallSet::follow_curve(Prescribed& prescribed) const {
+  const double s = (time_ - prescribed.curve_start) / prescribed.curve_length;
+  for (std::size_t k = 0; k < prescribed.position.size(); ++k) {
+    const Vec3* const curve = &prescribed.curve[4 * k];
+    prescribed.position[k] = curve[0] + s * (curve[1] + s * (curve[2] + s * curve[3]));
+    prescribed.velocity[k] = (curve[1] + s * (2 * curve[2] + 3 * s * curve[3])) / prescribed.curve_length;
+  }
+  prescribed.start = time_;
 }
 
 void WallSet::begin_forces() {

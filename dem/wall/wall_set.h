@@ -123,6 +123,11 @@ class WallSet {
   /// What a coupled solver says at the start of a window: the surface is at x₀ + displacement and moves at `velocity` until the next call.
   /// One vector a vertex of the wall, whose motion must be prescribed(). @param time  of the clock that move() gets
   void prescribe(std::size_t wall, std::span<const Vec3> displacements, std::span<const Vec3> velocities, double time);
+  /// The same where the window's end is assumed too: in between every vertex follows Hermite's cubic. @param length  of the window [s]
+  struct Instant {
+    std::span<const Vec3> displacements, velocities;
+  };
+  void prescribe(std::size_t wall, const Instant& start, const Instant& end, double time, double length);
 
   /// Forces of the present step, for servos: begin, then every partition's WallContactList::resultants().
   void begin_forces();
@@ -232,6 +237,9 @@ class WallSet {
     std::vector<Vec3> position, velocity, marked;  // at `start`; at the last mark
     double start = 0, fastest = 0;                 // largest |velocity|
     double travel = 0, travel_time = 0;            // largest distance from `marked` at that time
+    // Only between two known instants: four a vertex, x = p + s (q + s (r + s c)), s from 0 to 1.
+    std::vector<Vec3> curve;
+    double curve_start = 0, curve_length = 0;
 
     template <class Archive>
     void state(Archive& archive) {
@@ -242,9 +250,13 @@ class WallSet {
       archive("fastest", fastest);
       archive("travel", travel);
       archive("travel_time", travel_time);
+      archive("curve", curve);
+      archive("curve_start", curve_start);
+      archive("curve_length", curve_length);
     }
   };
 
+  void follow_curve(Prescribed& prescribed) const;
   std::size_t ball_index(std::uint32_t element) const { return element - facets_.size() - planes_.size(); }
   void add_facet(std::uint32_t wall, const std::array<std::uint32_t, 3>& vertices);
   void glue(std::uint32_t wall);

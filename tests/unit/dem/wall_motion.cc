@@ -199,6 +199,41 @@ TEST(Travel, IsTheWayOfATranslationAndBoundsATurn) {
   EXPECT_LE(turns.travel_since_mark(), farthest + 0.02 * radius + 1e-6);  // the arc of 0.02 rad is longer by what a particle on top adds
 }
 
+// What an implicit coupling says: between a window's start and its assumed end a vertex follows the cubic of both.
+TEST(PrescribedWall, FollowsACubicBetweenTwoInstants) {
+  const auto floor = moved(triangulated_floor(0.1, 2), Motion::prescribed());
+  WallSet set({floor});
+  const auto& rest = floor.mesh.points;
+  // A motion that is a cubic itself is followed exactly.
+  const auto place = [](const Vec3& x, double t) { return Vec3(x[0] * t, 0.1 * t * t, 2 * t * t * t - x[1] * t * t); };
+  const auto speed = [](const Vec3& x, double t) { return Vec3(x[0], 0.2 * t, 6 * t * t - 2 * x[1] * t); };
+  const double start = 0.2, length = 0.1;
+  std::vector<Vec3> u0, v0, u1, v1;
+  for (const auto& x : rest) {
+    u0.push_back(place(x, start)), v0.push_back(speed(x, start));
+    u1.push_back(place(x, start + length)), v1.push_back(speed(x, start + length));
+  }
+  set.mark(Vec3::Constant(-1), Vec3::Constant(1), radius);
+  set.prescribe(0, {u0, v0}, {u1, v1}, start, length);
+  for (const double t : {0.2, 0.23, 0.25, 0.3}) {
+    set.move(t, 0.01);
+    const auto now = set.positions(0);
+    double farthest = 0;
+    for (std::size_t v = 0; v < rest.size(); ++v) {
+      EXPECT_LT((now[v] - rest[v] - place(rest[v], t)).norm(), 1e-16);
+      farthest = std::max(farthest, (now[v] - rest[v]).norm());
+    }
+    EXPECT_GE(set.travel_since_mark(), farthest * (1 - 1e-14));
+  }
+  const auto contacts = contacts_at(set, rest[0] + place(rest[0], 0.3) + Vec3(1e-3, 1e-3, 0.002));
+  ASSERT_FALSE(contacts.empty());
+  for (const auto& contact : contacts) {
+    Vec3 expected = Vec3::Zero();
+    for (std::size_t n = 0; n < 3; ++n) expected += contact.weights[n] * speed(rest[set.facet(contact.element)[n]], 0.3);
+    EXPECT_LT((set.velocity_at(contact) - expected).norm(), 1e-14);
+  }
+}
+
 // What a coupled solver says: a bent and stretched floor.
 TEST(PrescribedWall, StartsAtWhatItReceivesAndMovesOnWithItsVelocity) {
   const auto floor = moved(triangulated_floor(0.1, 4), Motion::prescribed());
