@@ -225,6 +225,7 @@ TEST(PrescribedWall, FollowsACubicBetweenTwoInstants) {
     }
     EXPECT_GE(set.travel_since_mark(), farthest * (1 - 1e-14));
   }
+  set.mark(Vec3::Constant(-1), Vec3::Constant(1), radius);
   const auto contacts = contacts_at(set, rest[0] + place(rest[0], 0.3) + Vec3(1e-3, 1e-3, 0.002));
   ASSERT_FALSE(contacts.empty());
   for (const auto& contact : contacts) {
