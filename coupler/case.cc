@@ -160,7 +160,9 @@ void read_scheme(const io::Table& coupling, bool couples, Case& read) {
                 : scheme == "parallel" ? SchemeKind::parallel_explicit
                 : scheme == "implicit" ? SchemeKind::serial_implicit
                                        : SchemeKind::one_way;
-  if (read.scheme == SchemeKind::parallel_explicit && !coupling.flag("allow_unstable_scheme", false))
+  const bool explicitly = read.scheme == SchemeKind::serial_explicit || read.scheme == SchemeKind::parallel_explicit;
+  if (explicitly) read.allows_unstable = coupling.flag("allow_unstable_scheme", false);
+  if (read.scheme == SchemeKind::parallel_explicit && !read.allows_unstable)
     coupling.fail("scheme",
                   "= \"parallel\" loads the structure with the force of the window before, which makes energy at every window's length unless "
                   "the structure damps at least half of contact frequency times window. Use \"explicit\" or \"implicit\", or say "

@@ -90,6 +90,7 @@ struct Case {
   std::int64_t windows = 0;
   SchemeKind scheme = SchemeKind::one_way;
   ImplicitSettings implicit;
+  bool allows_unstable = false;  ///< explicit schemes
   Loads loads = Loads::history;
   std::int64_t loads_from = 0;  ///< first window that receivers are given (history)
   std::int64_t load_start = 0;  ///< windows [load_start, load_end) of a mean or snapshot

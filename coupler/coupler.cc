@@ -26,9 +26,9 @@ struct Stages {
   std::unique_ptr<Scheme> scheme;
 };
 
-std::unique_ptr<Scheme> scheme_of(const Case& read, Crew& crew, Account& account) {
+std::unique_ptr<Scheme> scheme_of(const Case& read, Crew& crew, Account& account, Reporter& reporter) {
   if (read.scheme == SchemeKind::one_way) return std::make_unique<OneWay>(read, crew, account);
-  return std::make_unique<TwoWay>(read, crew, account);
+  return std::make_unique<TwoWay>(read, crew, account, reporter);
 }
 
 void compute(const Case& read, Crew& crew, const std::string& results, Reporter& reporter,
@@ -36,7 +36,7 @@ void compute(const Case& read, Crew& crew, const std::string& results, Reporter&
   crew.assemble();
   stages.record.emplace(read, results);
   stages.account.emplace(read, crew, *stages.record, stages.quantities, reporter);
-  stages.scheme = scheme_of(read, crew, *stages.account);
+  stages.scheme = scheme_of(read, crew, *stages.account, reporter);
   reporter.assembled(
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   stages.scheme->run();

@@ -83,9 +83,9 @@ const geometry::SurfaceMesh& Crew::surface(const SurfaceName& name,
 }
 
 void Crew::begin_advance(const std::string& participant, std::int64_t start, std::int64_t end,
-                         std::vector<protocol::Field> fields) {
+                         std::vector<protocol::Field> fields, bool estimate) {
   auto& member = members_.at(participant);
-  const protocol::Window window{start, end, case_.time(start), case_.time(end) - case_.time(start)};
+  const protocol::Window window{start, end, case_.time(start), case_.time(end) - case_.time(start), estimate};
   enter(member, Member::Phase::advancing,
         fmt::format("advancing from {:.6g} s to {:.6g} s", window.start_time, window.end_time()));
   if (member.replay) {
@@ -277,7 +277,7 @@ void Crew::take_surfaces(Member& member, std::vector<protocol::Surface> surfaces
   for (auto& surface : surfaces) {
     if (surface.name.find('/') != std::string::npos)
       fail(member, fmt::format("offers a surface with a slash in its name, \"{}\"", surface.name));
-    member.initial[surface.name] = {std::move(surface.displacement), std::move(surface.velocity)};
+    member.initial[surface.name] = {std::move(surface.displacement), std::move(surface.velocity), std::move(surface.mass)};
     if (!member.surfaces.emplace(surface.name, std::move(surface.mesh)).second)
       fail(member, fmt::format("offers the surface {} twice", surface.name));
   }

@@ -40,7 +40,7 @@ class Crew {
 
   /// A surface's motion when coupled time begins; empty where it is at rest.
   struct Initial {
-    std::vector<geometry::Vec3> displacement, velocity;
+    std::vector<geometry::Vec3> displacement, velocity, mass;
   };
   const Initial& initial(const SurfaceName& name) const { return members_.at(name.participant).initial.at(name.surface); }
 
@@ -50,7 +50,7 @@ class Crew {
 
   /// Asks a participant, which must be idle, for the windows [start, end).
   void begin_advance(const std::string& participant, std::int64_t start, std::int64_t end,
-                     std::vector<protocol::Field> fields);
+                     std::vector<protocol::Field> fields, bool estimate = false);
   struct Answer {
     std::string participant;
     protocol::Advance advance;

@@ -35,7 +35,8 @@ double work(const std::vector<Vec3>& forces, const std::vector<Vec3>& from, cons
 
 }  // namespace
 
-TwoWay::TwoWay(const Case& read, Crew& crew, Account& account) : case_(read), crew_(crew), account_(account) {
+TwoWay::TwoWay(const Case& read, Crew& crew, Account& account, Reporter& reporter)
+    : case_(read), crew_(crew), account_(account), reporter_(reporter) {
   for (const auto& participant : case_.participants) (case_.receives(participant.name) ? structures_ : loaders_).push_back(participant.name);
   for (const auto& link : account_.links()) {
     if (!link.mapping) continue;
@@ -44,6 +45,7 @@ TwoWay::TwoWay(const Case& read, Crew& crew, Account& account) : case_(read), cr
     const Vectors none(link.to->points.size(), Vec3::Zero());
     motion.displacement = initial.displacement.empty() ? none : initial.displacement;
     motion.velocity = initial.velocity.empty() ? none : initial.velocity;
+    if (case_.scheme != SchemeKind::serial_implicit && !initial.mass.empty()) masses_[link.about->to.text()] = initial.mass;
   }
   if (case_.scheme == SchemeKind::serial_implicit) acceleration_ = make_acceleration(case_.implicit.acceleration);
 }
@@ -184,7 +186,7 @@ void TwoWay::begin_loaders(const Motions* end) {
       fields.push_back({surface, "end_displacement", std::move(stop.displacement)});
       fields.push_back({surface, "end_velocity", std::move(stop.velocity)});
     }
-    crew_.begin_advance(name, window_, window_ + 1, std::move(fields));
+    crew_.begin_advance(name, window_, window_ + 1, std::move(fields), estimates());
   }
 }
 
@@ -221,6 +223,47 @@ void TwoWay::gather(std::size_t answers, WindowRecord& window, Forces& forces, M
     }
   }
   for (const auto& [surface, values] : forces) window.forces[surface] = values;
+  if (estimates()) check_stability(came);
+}
+
+// Contacts come and go slowly beside windows.
+bool TwoWay::estimates() const { return !masses_.empty() && (window_ < 10 || window_ % 20 == 0); }
+
+void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& answers) {
+  for (const auto& [to, mass] : masses_) {
+    Vectors stiffness(mass.size(), Vec3::Zero()), part(mass.size());
+    for (const auto& link : account_.links()) {
+      if (!link.mapping || link.about->to.text() != to) continue;
+      const auto answer = answers.find(link.about->from.participant);
+      if (answer == answers.end()) continue;
+      for (const auto& field : answer->second.fields) {
+        if (field.surface != link.about->from.surface || field.name != "stiffness") continue;
+        link.mapping->forces(field.values, part);
+        for (std::size_t k = 0; k < part.size(); ++k) stiffness[k] += part[k];
+      }
+    }
+    double worst = 0;
+    std::size_t where = 0;
+    for (std::size_t k = 0; k < mass.size(); ++k)
+      for (int d = 0; d < case_.dimension; ++d)
+        if (mass[k][d] > 0 && stiffness[k][d] > worst * mass[k][d]) {
+          worst = stiffness[k][d] / mass[k][d];
+          where = k;
+        }
+    const double ratio = case_.window * std::sqrt(worst);
+    if (ratio <= 0.5) continue;
+    const auto found = std::find_if(account_.links().begin(), account_.links().end(), [&](const Link& link) { return link.mapping && link.about->to.text() == to; });
+    const Vec3& at = found->to->points[where];
+    const auto text = fmt::format("at {:.6g} s the contacts on {} at ({:.4g}, {:.4g}, {:.4g}) m and the mass there swing at {:.4g} rad/s, "
+                                  "{:.2f} radians a window", case_.time(window_), to, at[0], at[1], at[2], std::sqrt(worst), ratio);
+    if (ratio > 1 && !case_.allows_unstable)
+      throw Failure("coupler", "coupling",
+                    fmt::format("{}: more than 1 is unstable in an explicit scheme. Take window = {:.2g} or less, softer contacts, or scheme = "
+                                "\"implicit\"; or say allow_unstable_scheme = true.", text, 0.5 / std::sqrt(worst)),
+                    Failure::Cause::limit);
+    if (!warned_) reporter_.note(fmt::format("{}; from 0.5 on the explicit scheme loses accuracy, beyond 1 it is refused.", text));
+    warned_ = true;
+  }
 }
 
 // What the coupling makes: the work of the forces on the structure, less that on the surface that sent them, which went another way or,

@@ -23,10 +23,13 @@ namespace acopla::coupler {
 ///   the structure damps, so it is refused unless the case insists.
 /// - implicit: the loaders move from (u_n, v_n) to an assumed (u_{n+1}, v_{n+1}), which is bettered until what the structures answer is the
 ///   same within the tolerances. Everybody returns to the window's start before each iteration but the first.
+///
+/// An explicit scheme is a mass on a spring by central differences: contacts of stiffness k on a node of mass M swing at ω_c = sqrt(k/M), and
+/// beyond ω_c Δt = 2 they throw it away. Where the participants say both, ω_c Δt is noted beyond 0.5, and refused beyond 1.
 class TwoWay final : public Scheme {
  public:
   /// @throws io::UserError where nobody answers, or a surface would be moved by two
-  TwoWay(const Case& read, Crew& crew, Account& account);
+  TwoWay(const Case& read, Crew& crew, Account& account, Reporter& reporter);
   void run() override;
 
  private:
@@ -43,6 +46,8 @@ class TwoWay final : public Scheme {
   void step_with_iterations(WindowRecord& window);
 
   void begin_loaders(const Motions* end);
+  bool estimates() const;
+  void check_stability(const std::map<std::string, protocol::Advance>& answers);
   void begin_structures(const Forces& forces);
   void gather(std::size_t answers, WindowRecord& window, Forces& forces, Motions& motions);
   void book_work(WindowRecord& window, const Forces& acting, const Motions& end, const Motions& moved_to) const;
@@ -56,12 +61,15 @@ class TwoWay final : public Scheme {
   const Case& case_;
   Crew& crew_;
   Account& account_;
+  Reporter& reporter_;
   std::vector<std::string> loaders_, structures_;
   Motions now_;          // at the present window's start
   Forces last_forces_;   // parallel: on the structures, of the window before
   Forces last_sent_;     // parallel: by the surfaces that sent them
   std::unique_ptr<Acceleration> acceleration_;  // implicit only
   std::int64_t window_ = 0;
+  std::map<std::string, Vectors> masses_;  // of the structures' surfaces that know them; explicit schemes only
+  bool warned_ = false;
 };
 
 }  // namespace acopla::coupler

@@ -53,6 +53,8 @@ class Engine {
   StepRatio step_ratio(double step) const { return stability(step).ratio(); }
   /// The same in parts: a bound that costs some steps, a limit that costs hundreds in a large bed.
   StabilityEstimate stability(double step) const;
+  /// Normal stiffness of the contacts on each vertex of a wall that is sent, in all three components [N/m].
+  std::vector<Vec3> wall_stiffness(std::size_t wall) const;
   /// Deepest overlap over the smaller radius.
   double worst_overlap() const;
   std::uint64_t rebuilds() const { return rebuilds_; }

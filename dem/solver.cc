@@ -137,6 +137,10 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
   protocol::Advance result;
   result.steps = steps;
   for (const auto wall : sent_) result.fields.push_back({scene_.walls[wall].name, "force", load_.vertex_force[wall]});
+  if (window.estimate)
+    for (const auto wall : received_)
+      if (std::find(sent_.begin(), sent_.end(), wall) != sent_.end())
+        result.fields.push_back({scene_.walls[wall].name, "stiffness", engine_->wall_stiffness(wall)});
   result.quantities = quantities(step);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   seconds_ += seconds;

@@ -117,7 +117,7 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses) {
     coupled_.push_back({use, make_interface(settings_, body_->model.mesh, use.surface)});
-    surfaces.push_back({use.surface, coupled_.back().interface.surface()});
+    surfaces.push_back({use.surface, coupled_.back().interface.surface(), {}, {}});
   }
   seconds_.setup = setup.seconds();
   const Stopwatch factor;
@@ -128,6 +128,11 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   else if (body_->dynamics)
     begin_motion();
   seconds_.factor = factor.seconds();
+  // Where it does not begin at rest in its reference position: its weight bends it, or its supports move.
+  for (auto& field : fields())
+    for (auto& surface : surfaces)
+      if (surface.name == field.surface && std::any_of(field.values.begin(), field.values.end(), [](const Vec3& v) { return v != Vec3::Zero(); }))
+        (field.name == "displacement" ? surface.displacement : surface.velocity) = std::move(field.values);
   return surfaces;
 }
 

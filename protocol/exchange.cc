@@ -137,6 +137,7 @@ Message interface_message(const std::vector<Surface>& surfaces) {
     message.arrays.push_back(Array::of("kinds", surface.name, {faces}, std::move(kinds)));
     if (!surface.displacement.empty()) message.arrays.push_back(vectors("displacement", surface.name, surface.displacement));
     if (!surface.velocity.empty()) message.arrays.push_back(vectors("velocity", surface.name, surface.velocity));
+    if (!surface.mass.empty()) message.arrays.push_back(vectors("mass", surface.name, surface.mass));
   }
   message.body = {{"surfaces", names}};
   return message;
@@ -145,7 +146,7 @@ Message interface_message(const std::vector<Surface>& surfaces) {
 std::vector<Surface> read_interface(const Message& message) {
   std::vector<Surface> surfaces;
   for (const auto& name : value<std::vector<std::string>>(message, message.body, "surfaces")) {
-    Surface surface{name, {}, {}, {}};
+    Surface surface{name, {}, {}, {}, {}};
     surface.mesh.points = vectors(array(message, "points", name));
     const auto nodes = array(message, "nodes", name).integers();
     std::size_t first = 0;
@@ -163,7 +164,7 @@ std::vector<Surface> read_interface(const Message& message) {
       first += count;
     }
     if (first != nodes.size()) throw ProtocolError(fmt::format("surface {} names more nodes than its faces need", name));
-    for (const auto& [field, values] : {std::pair{"displacement", &surface.displacement}, {"velocity", &surface.velocity}})
+    for (const auto& [field, values] : {std::pair{"displacement", &surface.displacement}, {"velocity", &surface.velocity}, {"mass", &surface.mass}})
       if (const auto* given = message.find(field, name)) {
         *values = vectors(*given);
         if (values->size() != surface.mesh.points.size())
@@ -178,13 +179,15 @@ Message advance_message(const Window& window, const std::vector<Field>& fields) 
   Message message;
   message.kind = Kind::advance;
   message.body = {{"start", window.start}, {"end", window.end}};
+  if (window.estimate) message.body["estimate"] = true;
   for (const auto& field : fields) message.arrays.push_back(vectors(field.name, field.surface, field.values));
   return message;
 }
 
 AdvanceRequest read_advance(const Message& message) {
   AdvanceRequest request{value<std::int64_t>(message, message.body, "start"),
-                         value<std::int64_t>(message, message.body, "end"), read_fields(message)};
+                         value<std::int64_t>(message, message.body, "end"), read_fields(message),
+                         message.body.contains("estimate") && value<bool>(message, message.body, "estimate")};
   if (request.start < 0 || request.end <= request.start) throw ProtocolError("advance over a window that has no length");
   return request;
 }

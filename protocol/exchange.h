@@ -27,6 +27,7 @@ Message advance_message(const Window& window, const std::vector<Field>& fields);
 struct AdvanceRequest {
   std::int64_t start = 0, end = 0;
   std::vector<Field> fields;
+  bool estimate = false;
 };
 AdvanceRequest read_advance(const Message& message);
 

@@ -40,6 +40,9 @@ struct Surface {
   geometry::SurfaceMesh mesh;  ///< reference position
   /// Where it is and how it moves when coupled time begins, per point [m], [m/s]; empty: at rest in its reference position.
   std::vector<Eigen::Vector3d> displacement = {}, velocity = {};
+  /// Of a structure in motion: what a sudden force on a point alone would accelerate, by direction, 1/(M⁻¹)_nn [kg]; 0 where it is held.
+  /// The coupler compares it with the stiffness of what touches it. Empty: not known.
+  std::vector<Eigen::Vector3d> mass = {};
 };
 
 /// A span of coupled time, in ticks and seconds.
@@ -47,6 +50,9 @@ struct Window {
   std::int64_t start = 0, end = 0;  ///< [ticks]
   double start_time = 0;            ///< [s]
   double length = 0;                ///< [s]
+  /// The coupler asks how stiffly the surfaces that are moved are held by what touches them: a field `stiffness` beside the others, in
+  /// every component the sum of the contacts' normal stiffnesses [N/m]. Who does not know sends none.
+  bool estimate = false;
   double end_time() const { return start_time + length; }
 };
 

@@ -98,7 +98,7 @@ class Session {
       case Kind::advance: {
         auto asked = read_advance(request);
         state_ = fmt::format("advancing from {:.6g} s to {:.6g} s", run_.time(asked.start), run_.time(asked.end));
-        const Window window{asked.start, asked.end, run_.time(asked.start), run_.time(asked.end - asked.start)};
+        const Window window{asked.start, asked.end, run_.time(asked.start), run_.time(asked.end - asked.start), asked.estimate};
         return advanced_message(participant_.advance(window, asked.fields));
       }
       case Kind::save: participant_.save(); return done_message();

@@ -566,6 +566,24 @@ void WallContactList::spread(const Group& group, std::size_t contact, std::uint3
   forces.couple[walls.sent_facet(wall, facet)] -= turns ? Vec3(walls.rotation(wall).transpose() * rest) : rest;
 }
 
+void WallContactList::add_stiffness(const KernelTable& kernels, const WallSet& walls, const Particles& particles, WallForces& forces) const {
+  for (const auto& group : groups_) {
+    const auto& contacts = group.contacts;
+    if (contacts.size == 0) continue;
+    const auto& kernel = kernels.of(group.particle_material, group.wall_material);
+    for (std::size_t c = 0; c < contacts.size; ++c) {
+      const auto element = element_of(group, c);
+      const double overlap = contacts.normal[c].w;
+      if (!walls.sends(walls.wall_of(element)) || overlap <= 0) continue;
+      const auto i = contacts.particle[c];
+      const double r = particles.radius_of(i), curvature = contacts.curvature.empty() ? 0 : contacts.curvature[c];
+      const double stiffness = kernel.stiffness(overlap, r / (1 + r * curvature), particles.mass_of(i), particles.inertia_of(i)).normal;
+      const Vec3 point = particles.position[i].vector() - (r - overlap) * contacts.normal[c].vector();
+      spread(group, c, element, walls, point, Vec3::Constant(-stiffness), Vec3::Zero(), forces);
+    }
+  }
+}
+
 std::size_t WallContactList::contact_count() const {
   std::size_t count = 0;
   for (const auto& group : groups_) count += group.contacts.size;

@@ -51,6 +51,8 @@ class WallContactList {
 
   /// Of the last evaluation, one a wall.
   std::span<const WallResultant> resultants() const { return resultants_; }
+  /// Adds the normal stiffness of every present contact to the vertices of walls that are sent, in all three components [N/m].
+  void add_stiffness(const KernelTable& kernels, const WallSet& walls, const Particles& particles, WallForces& forces) const;
   std::size_t contact_count() const;
   std::size_t candidate_count() const;
   /// Calls action(particle, particle_material, wall_material, overlap, normal, curvature) for every present contact.
