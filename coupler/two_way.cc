@@ -231,35 +231,36 @@ bool TwoWay::estimates() const { return !masses_.empty() && (window_ < 10 || win
 
 void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& answers) {
   for (const auto& [to, mass] : masses_) {
-    Vectors stiffness(mass.size(), Vec3::Zero()), part(mass.size());
+    Vectors hold(mass.size(), Vec3::Zero()), part(mass.size());  // k Δt² + 2 c Δt [kg]
     for (const auto& link : account_.links()) {
       if (!link.mapping || link.about->to.text() != to) continue;
       const auto answer = answers.find(link.about->from.participant);
       if (answer == answers.end()) continue;
       for (const auto& field : answer->second.fields) {
-        if (field.surface != link.about->from.surface || field.name != "stiffness") continue;
+        if (field.surface != link.about->from.surface || (field.name != "stiffness" && field.name != "dashpot")) continue;
         link.mapping->forces(field.values, part);
-        for (std::size_t k = 0; k < part.size(); ++k) stiffness[k] += part[k];
+        const double factor = field.name == "stiffness" ? case_.window * case_.window : 2 * case_.window;
+        for (std::size_t k = 0; k < part.size(); ++k) hold[k] += factor * part[k];
       }
     }
     double worst = 0;
     std::size_t where = 0;
     for (std::size_t k = 0; k < mass.size(); ++k)
       for (int d = 0; d < case_.dimension; ++d)
-        if (mass[k][d] > 0 && stiffness[k][d] > worst * mass[k][d]) {
-          worst = stiffness[k][d] / mass[k][d];
+        if (mass[k][d] > 0 && hold[k][d] > worst * mass[k][d]) {
+          worst = hold[k][d] / mass[k][d];
           where = k;
         }
-    const double ratio = case_.window * std::sqrt(worst);
+    const double ratio = std::sqrt(worst);
     if (ratio <= 0.5) continue;
     const auto found = std::find_if(account_.links().begin(), account_.links().end(), [&](const Link& link) { return link.mapping && link.about->to.text() == to; });
     const Vec3& at = found->to->points[where];
-    const auto text = fmt::format("at {:.6g} s the contacts on {} at ({:.4g}, {:.4g}, {:.4g}) m and the mass there swing at {:.4g} rad/s, "
-                                  "{:.2f} radians a window", case_.time(window_), to, at[0], at[1], at[2], std::sqrt(worst), ratio);
+    const auto text = fmt::format("at {:.6g} s the contacts on {} at ({:.4g}, {:.4g}, {:.4g}) m and the {:.3g} kg there turn by {:.2f} radians a window",
+                                  case_.time(window_), to, at[0], at[1], at[2], mass[where].maxCoeff(), ratio);
     if (ratio > 1 && !case_.allows_unstable)
       throw Failure("coupler", "coupling",
-                    fmt::format("{}: more than 1 is unstable in an explicit scheme. Take window = {:.2g} or less, softer contacts, or scheme = "
-                                "\"implicit\"; or say allow_unstable_scheme = true.", text, 0.5 / std::sqrt(worst)),
+                    fmt::format("{}: an explicit scheme is unstable from 2 on, and refused from 1 on. Shorten the window, take softer contacts, a "
+                                "heavier surface or scheme = \"implicit\"; or say allow_unstable_scheme = true.", text),
                     Failure::Cause::limit);
     if (!warned_) reporter_.note(fmt::format("{}; from 0.5 on the explicit scheme loses accuracy, beyond 1 it is refused.", text));
     warned_ = true;

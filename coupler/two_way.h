@@ -24,8 +24,9 @@ namespace acopla::coupler {
 /// - implicit: the loaders move from (u_n, v_n) to an assumed (u_{n+1}, v_{n+1}), which is bettered until what the structures answer is the
 ///   same within the tolerances. Everybody returns to the window's start before each iteration but the first.
 ///
-/// An explicit scheme is a mass on a spring by central differences: contacts of stiffness k on a node of mass M swing at ω_c = sqrt(k/M), and
-/// beyond ω_c Δt = 2 they throw it away. Where the participants say both, ω_c Δt is noted beyond 0.5, and refused beyond 1.
+/// An explicit scheme is like central differences, however implicit the structure's own steps are: contacts of stiffness k and dashpot c on a
+/// node of mass M = 1/(M⁻¹)_nn throw it away beyond (k Δt² + 2 c Δt)/M = 4 (derived in docs/theory.md). Where the participants say these numbers,
+/// the root of the left side, ω_c Δt where nothing damps, is noted beyond 0.5, and refused beyond 1.
 class TwoWay final : public Scheme {
  public:
   /// @throws io::UserError where nobody answers, or a surface would be moved by two

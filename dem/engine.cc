@@ -376,13 +376,17 @@ Vec3 Engine::momentum() const {
 
 Energy Engine::energy() { return ledger_.balance(kinetic_energy(), potential_energy()); }
 
-std::vector<Vec3> Engine::wall_stiffness(std::size_t wall) const {
-  WallForces forces;
-  forces.vertex.assign(walls_.sent_vertices(), Vec3::Zero());
-  forces.couple.assign(walls_.sent_facets(), Vec3::Zero());
-  for (const auto& partition : partitions_) partition.walls.add_stiffness(kernels_, walls_, particles_, forces);
-  const auto begin = forces.vertex.begin() + static_cast<std::ptrdiff_t>(walls_.sent_vertex(wall, walls_.first_vertex(wall)));
-  return {begin, begin + (walls_.first_vertex(wall + 1) - walls_.first_vertex(wall))};
+Engine::Hold Engine::hold_on(std::size_t wall) const {
+  WallForces stiffness;
+  stiffness.vertex.assign(walls_.sent_vertices(), Vec3::Zero());
+  stiffness.couple.assign(walls_.sent_facets(), Vec3::Zero());
+  auto dashpot = stiffness;
+  for (const auto& partition : partitions_) partition.walls.add_stiffness(kernels_, walls_, particles_, stiffness, dashpot);
+  const auto of_wall = [&](const WallForces& all) {
+    const auto begin = all.vertex.begin() + static_cast<std::ptrdiff_t>(walls_.sent_vertex(wall, walls_.first_vertex(wall)));
+    return std::vector<Vec3>(begin, begin + (walls_.first_vertex(wall + 1) - walls_.first_vertex(wall)));
+  };
+  return {of_wall(stiffness), of_wall(dashpot)};
 }
 
 StabilityEstimate Engine::stability(double step) const {

@@ -53,8 +53,11 @@ class Engine {
   StepRatio step_ratio(double step) const { return stability(step).ratio(); }
   /// The same in parts: a bound that costs some steps, a limit that costs hundreds in a large bed.
   StabilityEstimate stability(double step) const;
-  /// Normal stiffness of the contacts on each vertex of a wall that is sent, in all three components [N/m].
-  std::vector<Vec3> wall_stiffness(std::size_t wall) const;
+  /// How the contacts hold each vertex of a wall that is sent, the same in all three components.
+  struct Hold {
+    std::vector<Vec3> stiffness, dashpot;  ///< [N/m], [N s/m]
+  };
+  Hold hold_on(std::size_t wall) const;
   /// Deepest overlap over the smaller radius.
   double worst_overlap() const;
   std::uint64_t rebuilds() const { return rebuilds_; }

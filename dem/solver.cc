@@ -139,8 +139,11 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
   for (const auto wall : sent_) result.fields.push_back({scene_.walls[wall].name, "force", load_.vertex_force[wall]});
   if (window.estimate)
     for (const auto wall : received_)
-      if (std::find(sent_.begin(), sent_.end(), wall) != sent_.end())
-        result.fields.push_back({scene_.walls[wall].name, "stiffness", engine_->wall_stiffness(wall)});
+      if (std::find(sent_.begin(), sent_.end(), wall) != sent_.end()) {
+        auto hold = engine_->hold_on(wall);
+        result.fields.push_back({scene_.walls[wall].name, "stiffness", std::move(hold.stiffness)});
+        result.fields.push_back({scene_.walls[wall].name, "dashpot", std::move(hold.dashpot)});
+      }
   result.quantities = quantities(step);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   seconds_ += seconds;

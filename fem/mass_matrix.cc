@@ -1,5 +1,7 @@
 #include "fem/mass_matrix.h"
 
+#include <Eigen/Cholesky>
+
 namespace acopla::fem {
 namespace {
 
@@ -46,6 +48,25 @@ double MassMatrix::total() const {
   double sum = 0;
   for (const double value : values_) sum += value;
   return sum;
+}
+
+double MassMatrix::sudden(std::uint32_t node) const {
+  const auto near = pattern_->row(node);
+  const auto size = static_cast<Eigen::Index>(near.size());
+  Eigen::MatrixXd patch = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd unit = Eigen::VectorXd::Zero(size);
+  for (Eigen::Index a = 0; a < size; ++a) {
+    const auto row = pattern_->row(near[static_cast<std::size_t>(a)]);
+    const double* const values = values_.data() + pattern_->start(near[static_cast<std::size_t>(a)]);
+    if (near[static_cast<std::size_t>(a)] == node) unit[a] = 1;
+    // Both lists ascend.
+    std::size_t k = 0;
+    for (Eigen::Index b = 0; b < size && k < row.size(); ++b) {
+      while (k < row.size() && row[k] < near[static_cast<std::size_t>(b)]) ++k;
+      if (k < row.size() && row[k] == near[static_cast<std::size_t>(b)]) patch(a, b) = values[k];
+    }
+  }
+  return 1 / unit.dot(patch.llt().solve(unit));
 }
 
 }  // namespace acopla::fem

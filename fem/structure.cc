@@ -128,6 +128,19 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   else if (body_->dynamics)
     begin_motion();
   seconds_.factor = factor.seconds();
+  // What explicit schemes must know; nobody asks where nothing is sent back.
+  for (std::size_t k = 0; k < surfaces.size(); ++k) {
+    const auto& [use, interface] = coupled_[k];
+    if (!body_->mass || use.sends.empty()) continue;
+    const auto& held = body_->model.supports.fixed();
+    for (const auto node : interface.nodes()) {
+      Vec3 mass = Vec3::Zero();
+      const double sudden = body_->mass->sudden(node);
+      for (int d = 0; d < settings_.dimension; ++d)
+        if (!held[static_cast<std::size_t>(settings_.dimension) * node + static_cast<std::size_t>(d)]) mass[d] = sudden;
+      surfaces[k].mass.push_back(mass);
+    }
+  }
   // Where it does not begin at rest in its reference position: its weight bends it, or its supports move.
   for (auto& field : fields())
     for (auto& surface : surfaces)

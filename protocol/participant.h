@@ -50,8 +50,8 @@ struct Window {
   std::int64_t start = 0, end = 0;  ///< [ticks]
   double start_time = 0;            ///< [s]
   double length = 0;                ///< [s]
-  /// The coupler asks how stiffly the surfaces that are moved are held by what touches them: a field `stiffness` beside the others, in
-  /// every component the sum of the contacts' normal stiffnesses [N/m]. Who does not know sends none.
+  /// The coupler asks how stiffly the surfaces that are moved are held by what touches them: the fields `stiffness` [N/m] and `dashpot`
+  /// [N s/m] beside the others, in every component the sum over the contacts. Who does not know sends none.
   bool estimate = false;
   double end_time() const { return start_time + length; }
 };

@@ -566,7 +566,8 @@ void WallContactList::spread(const Group& group, std::size_t contact, std::uint3
   forces.couple[walls.sent_facet(wall, facet)] -= turns ? Vec3(walls.rotation(wall).transpose() * rest) : rest;
 }
 
-void WallContactList::add_stiffness(const KernelTable& kernels, const WallSet& walls, const Particles& particles, WallForces& forces) const {
+void WallContactList::add_stiffness(const KernelTable& kernels, const WallSet& walls, const Particles& particles, WallForces& stiffness,
+                                    WallForces& dashpot) const {
   for (const auto& group : groups_) {
     const auto& contacts = group.contacts;
     if (contacts.size == 0) continue;
@@ -577,9 +578,10 @@ void WallContactList::add_stiffness(const KernelTable& kernels, const WallSet& w
       if (!walls.sends(walls.wall_of(element)) || overlap <= 0) continue;
       const auto i = contacts.particle[c];
       const double r = particles.radius_of(i), curvature = contacts.curvature.empty() ? 0 : contacts.curvature[c];
-      const double stiffness = kernel.stiffness(overlap, r / (1 + r * curvature), particles.mass_of(i), particles.inertia_of(i)).normal;
+      const auto rates = kernel.stiffness(overlap, r / (1 + r * curvature), particles.mass_of(i), particles.inertia_of(i));
       const Vec3 point = particles.position[i].vector() - (r - overlap) * contacts.normal[c].vector();
-      spread(group, c, element, walls, point, Vec3::Constant(-stiffness), Vec3::Zero(), forces);
+      spread(group, c, element, walls, point, Vec3::Constant(-std::max(rates.normal, rates.shear)), Vec3::Zero(), stiffness);
+      spread(group, c, element, walls, point, Vec3::Constant(-std::max(rates.normal_dashpot, rates.shear_dashpot)), Vec3::Zero(), dashpot);
     }
   }
 }
