@@ -27,14 +27,38 @@ void Record::set_mapping(std::size_t interface, std::size_t unmapped, double wor
   mapping_[interface] = {unmapped, worst_distance};
 }
 
+Record::~Record() {
+  try {
+    write_pending();
+  } catch (const std::exception&) {  // a full disk was said before, or ends with the run's own failure
+  }
+}
+
 void Record::write(std::int64_t index, const WindowRecord& window) {
   if (!series_) return;
+  constexpr std::chrono::milliseconds pause{200};
+  constexpr std::size_t most_values = 8u << 20;  // 192 MiB
+  pending_.emplace_back(index, window);
+  for (const auto& [name, force] : window.forces) pending_values_ += force.size();
+  if (index + 1 < case_.windows && pending_values_ < most_values && std::chrono::steady_clock::now() - written_ < pause) return;
+  write_pending();
+}
+
+void Record::write_pending() {
+  if (pending_.empty()) return;
+  const auto windows = std::exchange(pending_, {});  // not again where this fails
+  pending_values_ = 0;
+  for (const auto& [index, window] : windows) append(index, window);
+  series_->flush();
+  written_ = std::chrono::steady_clock::now();
+}
+
+void Record::append(std::int64_t index, const WindowRecord& window) {
   series_->begin_window(case_.time(index), case_.time(index + 1));
   for (const auto& [name, force] : window.forces) series_->add_field(name, "force", force);
   for (const auto& [name, value] : window.quantities)
     series_->add_scalar("quantities/" + name, value);
   write_ledger(window);
-  series_->flush();
   const auto complete = index + 1;
   if (complete % case_.output_every == 0 || complete == case_.windows)
     for (const auto& [name, force] : window.forces) write_picture(index, name, force);

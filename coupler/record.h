@@ -2,6 +2,7 @@
 // surfaces.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -43,10 +44,16 @@ class Record {
   void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);
   /// What does not change: points without a partner, the farthest of those with one.
   void set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance);
-  /// Appends window `index`, which must follow the last one, and flushes.
+  ~Record();
+  Record(const Record&) = delete;
+  Record& operator=(const Record&) = delete;
+  /// Appends window `index`, which must follow the last one. The file is written and flushed at once where windows are long, and else some
+  /// times a second, in one go: a flush costs more than a short window, and between two of them the file stays whole.
   void write(std::int64_t index, const WindowRecord& window);
 
  private:
+  void write_pending();
+  void append(std::int64_t index, const WindowRecord& window);
   void write_ledger(const WindowRecord& window);
   void write_picture(std::int64_t index, const std::string& surface,
                      const std::vector<geometry::Vec3>& force);
@@ -57,6 +64,9 @@ class Record {
   std::map<std::string, geometry::SurfaceMesh> surfaces_;
   std::map<std::string, io::PvdSeries> pictures_;
   std::vector<std::pair<std::size_t, double>> mapping_;  // per interface
+  std::vector<std::pair<std::int64_t, WindowRecord>> pending_;
+  std::size_t pending_values_ = 0;
+  std::chrono::steady_clock::time_point written_{};
 };
 
 }  // namespace acopla::coupler

@@ -16,7 +16,7 @@ namespace acopla::io {
 ///   /SURFACE/FIELD  [windows, n, 3]                                 one row a window
 ///   /windows        [windows, 2]                                    start and end [s]
 ///   /TABLE          [windows]                                       scalar columns by group/name
-/// and flushes after every window, so that a run that stops leaves what it had. @throws UserError
+/// After flush() the file is whole, so that a run that stops leaves what it had. @throws UserError
 class SeriesWriter {
  public:
   explicit SeriesWriter(const std::string& path);
