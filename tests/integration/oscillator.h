@@ -32,6 +32,7 @@ class Loader final : public protocol::Participant {
  public:
   int steps = 32;              ///< of the classic Runge–Kutta method in a window: exact beside the coupling's error
   double stiffness = middle_spring, wall = wall_spring, own_mass = mass;
+  double dashpot = 0;          ///< beside the middle spring [N s/m]
   bool only_pushes = false;    ///< a contact: no force where the spring is longer than unstrained
   double gap = 0;              ///< [m], of the contact
   double u = 1, v = 0;         ///< [m], [m/s]
@@ -51,20 +52,20 @@ class Loader final : public protocol::Participant {
       const double d1 = (*d_end)[0][0], v1 = (*v_end)[0][0];
       return d0 * (1 + s * s * (2 * s - 3)) + d1 * s * s * (3 - 2 * s) + h * (v0 * s * (s - 1) * (s - 1) + v1 * s * s * (s - 1));
     };
-    const auto force = [&](double own, double s) {
+    const auto force = [&](double own, double own_speed, double s) {
       const double stretch = own - other(s) - gap;
-      return only_pushes && stretch < 0 ? 0 : stiffness * stretch;  // on mass 2
+      return only_pushes && stretch < 0 ? 0 : stiffness * stretch + dashpot * (own_speed - v0);  // on mass 2
     };
-    const auto acceleration = [&](double own, double s) { return (-wall * own - force(own, s)) / own_mass; };
+    const auto acceleration = [&](double own, double own_speed, double s) { return (-wall * own - force(own, own_speed, s)) / own_mass; };
     double impulse = 0;
     const double dt = h / steps, ds = 1.0 / steps;
     for (int n = 0; n < steps; ++n) {
       const double s = n * ds, middle = s + ds / 2;
-      const double a1 = acceleration(u, s), u2 = u + dt / 2 * v, v2 = v + dt / 2 * a1;
-      const double a2 = acceleration(u2, middle), u3 = u + dt / 2 * v2, v3 = v + dt / 2 * a2;
-      const double a3 = acceleration(u3, middle), u4 = u + dt * v3, v4 = v + dt * a3;
-      const double a4 = acceleration(u4, s + ds);
-      const double f = (force(u, s) + 2 * force(u2, middle) + 2 * force(u3, middle) + force(u4, s + ds)) / 6;
+      const double a1 = acceleration(u, v, s), u2 = u + dt / 2 * v, v2 = v + dt / 2 * a1;
+      const double a2 = acceleration(u2, v2, middle), u3 = u + dt / 2 * v2, v3 = v + dt / 2 * a2;
+      const double a3 = acceleration(u3, v3, middle), u4 = u + dt * v3, v4 = v + dt * a3;
+      const double a4 = acceleration(u4, v4, s + ds);
+      const double f = (force(u, v, s) + 2 * force(u2, v2, middle) + 2 * force(u3, v3, middle) + force(u4, v4, s + ds)) / 6;
       impulse += dt * f;
       u += dt / 6 * (v + 2 * v2 + 2 * v3 + v4);
       v += dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
@@ -74,6 +75,10 @@ class Loader final : public protocol::Participant {
     result.steps = static_cast<std::uint64_t>(steps);
     result.fields.push_back({"spring", "force", {Vec3(impulse / h, 0, 0)}});
     result.quantities = {{"u", u}, {"v", v}};
+    if (window.estimate) {
+      result.fields.push_back({"spring", "stiffness", {Vec3::Constant(stiffness)}});
+      result.fields.push_back({"spring", "dashpot", {Vec3::Constant(dashpot)}});
+    }
     return result;
   }
   void save() override { saved_ = {u, v, static_cast<double>(history.size())}; }
@@ -92,13 +97,17 @@ class Loader final : public protocol::Participant {
 class Structure final : public protocol::Participant {
  public:
   double u = 0, v = 0, own_mass = mass, wall = wall_spring;
+  bool knows_its_mass = false;  ///< and says it, so that the coupler can judge
 
   protocol::Introduction introduce() const override { return {"oscillator", 3, {"save"}}; }
   std::vector<protocol::Surface> start(const protocol::Run&) override {
     geometry::SurfaceMesh mesh;
     mesh.points = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
     mesh.add_face(geometry::FaceKind::triangle3, std::vector<std::uint32_t>{0, 1, 2});
-    return {{"mass", mesh, std::vector<Vec3>(3, Vec3(u, 0, 0)), std::vector<Vec3>(3, Vec3(v, 0, 0))}};
+    // A rigid body of three nodes: a third of the force, and of the mass, each.
+    std::vector<Vec3> masses;
+    if (knows_its_mass) masses.assign(3, Vec3::Constant(own_mass / 3));
+    return {{"mass", mesh, std::vector<Vec3>(3, Vec3(u, 0, 0)), std::vector<Vec3>(3, Vec3(v, 0, 0)), masses}};
   }
   protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override {
     double f = 0;

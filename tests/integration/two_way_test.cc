@@ -194,6 +194,53 @@ TEST(TwoWay, AContactThatBeginsLateIsMetByEveryAcceleration) {
   }
 }
 
+// Against a fixed partner the staggered scheme is neutral, with dashpots it loses energy, until (k Δt² + 2 c Δt)/m = 4 (docs/theory.md): whatever the
+// structure's own spring is, which its implicit step takes.
+TEST(TwoWay, TheStaggeredSchemeIsStableUpToItsLimitAndNotBeyond) {
+  const double window = 0.01;
+  // How much farther it goes in the second half of a run than in the first.
+  const auto growth = [&](double limit_share, double damped_part, double own_spring, std::size_t windows) {
+    Swing s;
+    const double x = 4 * limit_share;  // (k Δt² + 2 c Δt)/m
+    s.first.own_mass = 1e15;
+    s.first.wall = s.first.u = 0;
+    s.first.stiffness = (1 - damped_part) * x / (window * window);
+    s.first.dashpot = damped_part * x / (2 * window);
+    s.second.wall = own_spring;
+    s.second.u = 0.01;
+    s.second.v = 0.3;
+    s.outcome = run(case_text(window, window * static_cast<double>(windows), std::string(serial) + "\nallow_unstable_scheme = true"), s.first, s.second);
+    EXPECT_FALSE(s.outcome.error) << s.outcome.error->message;
+    const auto farthest = [&](std::size_t from, std::size_t to) {
+      double far = 0;
+      for (auto k = from; k < to; ++k) far = std::max({far, std::abs(s.second.history[k]), window * std::abs(s.second.velocities[k])});
+      return far;
+    };
+    return farthest(windows / 2, windows) / farthest(0, windows / 2);
+  };
+  for (const double damped_part : {0.0, 0.3, 0.9})
+    for (const double own_spring : {0.0, 1e3, 1e7}) {
+      EXPECT_LT(growth(0.9, damped_part, own_spring, 1000), 1.01) << damped_part << " " << own_spring;
+      // Beside a stiff spring of its own the growth beyond the limit is slow: 4 (share − 1)/(1 + K Δt²/4m) a window.
+      if (own_spring < 1e6) {
+        EXPECT_GT(growth(1.1, damped_part, own_spring, 100), 1e3) << damped_part << " " << own_spring;
+      }
+    }
+}
+
+TEST(TwoWay, WhereBothSidesSaySoTheLimitIsWatched) {
+  const auto judged = [](double share, const std::string& more = "") {
+    Swing s;
+    s.first.stiffness = std::pow(share / 0.01, 2);  // ω_c Δt = share
+    s.second.knows_its_mass = true;
+    s.outcome = run(case_text(0.01, 0.1, std::string(serial) + more), s.first, s.second);
+    return s.outcome.error ? s.outcome.error->message : "";
+  };
+  EXPECT_EQ(judged(0.99), "");
+  EXPECT_NE(judged(1.01).find("1.01 radians a window"), std::string::npos) << judged(1.01);
+  EXPECT_EQ(judged(1.01, "\nallow_unstable_scheme = true"), "");
+}
+
 TEST(TwoWay, TheEnergyThatTheCouplingMadeIsBookedAndLimited) {
   const auto explicitly = swing(1.0 / 64, 1, serial), implicitly = swing(1.0 / 64, 1, implicit);
   EXPECT_GT(std::abs(explicitly.outcome.ledgers.energy_made), 1e-3);
