@@ -18,6 +18,7 @@ from study import Study  # noqa: E402
 
 STUDIES = {
     "box_fill": "spheres fill a steel box: tables 4-4 to 4-11 of Nasato (2011), conservation, cost of the search",
+    "coupling": "two-way coupling: orders, schemes over mass and stiffness ratios, what a window costs beside bare messages",
     "dem_accuracy": "the DEM against closed forms, ODEs, statics and Gomes's piles (2014, chapter 3): error against step and run time",
     "dem_stability": "what steps the particles stand: limits of every law, extremes of every parameter, and whether what breaks says so",
     "dem_speed": "particle-steps per second on a settled bed against LAMMPS and LIGGGHTS; what each feature, thread and triangle costs",
