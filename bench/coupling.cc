@@ -1,5 +1,6 @@
 // What two-way coupling costs and how well it does, as JSON lines: coupling orders | map [--coarse] | overhead VERTICES WINDOWS | mapping VERTICES
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <chrono>
@@ -272,6 +273,8 @@ void mapping(std::size_t vertices) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  mallopt(M_MMAP_THRESHOLD, 256 << 20);  // as acopla-coupler does; for both sides of the comparison
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
   const std::string mode = argc > 1 ? argv[1] : "";
   if (mode == "orders") orders();
   else if (mode == "map") map(argc > 2 && std::string(argv[2]) == "--coarse");

@@ -1,5 +1,6 @@
 // acopla-coupler: the hub of a coupled run.
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <csignal>
@@ -77,6 +78,9 @@ void declare(CLI::App& app, Arguments& arguments) {
 
 int main_program(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
+  // Fields come and go with every window: their memory is kept, not given back and faulted in again.
+  mallopt(M_MMAP_THRESHOLD, 256 << 20);
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
   CLI::App app("acopla-coupler: couples the participants of a case that connect to it.");
   Arguments arguments;
   declare(app, arguments);

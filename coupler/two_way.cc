@@ -275,13 +275,19 @@ void TwoWay::book_work(WindowRecord& window, const Forces& acting, const Motions
     if (!link.mapping) continue;
     const auto from = link.about->from.text(), to = link.about->to.text();
     auto& row = window.ledger[k];
-    Vectors arrived(link.to->points.size());
-    link.mapping->forces(window.forces.at(from), arrived);
-    row.work_sent = work(arrived, now_.at(to).displacement, moved_to.at(to).displacement);
+    const auto ends_here = [&](const Link& other) { return other.mapping && other.about->to == link.about->to; };
+    const bool alone = std::count_if(account_.links().begin(), account_.links().end(), ends_here) == 1;
+    Vectors mapped;  // of this link alone, where others end there too
+    const auto arrived = [&](const Vectors& sent) -> const Vectors& {
+      if (alone && &sent == &window.forces.at(from)) return window.forces.at(to);  // mapped already
+      mapped.resize(link.to->points.size());
+      link.mapping->forces(sent, mapped);
+      return mapped;
+    };
+    row.work_sent = work(arrived(window.forces.at(from)), now_.at(to).displacement, moved_to.at(to).displacement);
     const auto found = acting.find(from);
     if (found == acting.end()) continue;  // nothing acted yet
-    link.mapping->forces(found->second, arrived);
-    row.work_received = work(arrived, now_.at(to).displacement, end.at(to).displacement);
+    row.work_received = work(arrived(found->second), now_.at(to).displacement, end.at(to).displacement);
   }
 }
 
