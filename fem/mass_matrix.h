@@ -28,7 +28,7 @@ class MassMatrix {
   const std::vector<double>& values() const { return values_; }  ///< m_ab a pair of the pattern
   double total() const;                                          ///< mass of the structure [kg]
   /// 1/(M⁻¹)_nn [kg]: what a sudden force on that node alone accelerates. Of the nodes that share a cell with it, the others held, which is a
-  /// percent or so too much.
+  /// few percent too much.
   double sudden(std::uint32_t node) const;
 
  private:

@@ -81,7 +81,7 @@ class AnOscillator : public testing::Test {
 };
 
 // What a sudden force on one node accelerates, against the inverse of the whole matrix. Only nodes of the same cells are asked, which on a regular
-// mesh of either degree is right within two percent, and never too little.
+// mesh of either degree is right within seven percent, and never too little.
 TEST(MassMatrix, KnowsWhatASuddenForceOnANodeMoves) {
   for (const unsigned degree : {1u, 2u}) {
     const Mesh mesh(write_block("sudden", {.size = {4, 2, 2}, .cells = {4, 2, 2}}), degree);
@@ -99,7 +99,7 @@ TEST(MassMatrix, KnowsWhatASuddenForceOnANodeMoves) {
     for (Eigen::Index n = 0; n < nodes; ++n) {
       const double exact = 1 / inverse(n, n), found = body.M.sudden(static_cast<std::uint32_t>(n));
       EXPECT_GE(found, exact * (1 - 1e-10));
-      EXPECT_LE(found, exact * 1.1) << degree << " " << n;
+      EXPECT_LE(found, exact * 1.07) << degree << " " << n;
     }
   }
 }

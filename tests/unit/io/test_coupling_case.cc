@@ -114,17 +114,30 @@ TEST(CouplingCase, OutOfRange) {
 }
 
 TEST(CouplingCase, WhatThisVersionDoesNotDoIsSaid) {
-  for (const char* scheme : {"explicit", "parallel", "implicit"})
-    expect_refused("one-way", scheme,
-                   std::string("case.toml:6:1: coupling.scheme = \"") + scheme +
-                       "\" is not in this version yet. Use \"one-way\".");
   expect_refused("one-way", "one-wey", "Did you mean \"one-way\"?");
   expect_refused("to = \"structure.inside\"", "to = \"structure.inside\"\nmapping = \"overlap\"",
                  "is not in this version yet. Use \"conservative\".");
   expect_refused(
       "[grains]",
       "[[coupling.interface]]\nfrom = \"structure.inside\"\nto = \"grains.box\"\n[grains]",
-      "that is two-way");
+      "answers with its motion by itself");
+}
+
+TEST(CouplingCase, SchemesAndTheirKeys) {
+  EXPECT_EQ(parse(with(good, "one-way", "explicit")).scheme, SchemeKind::serial_explicit);
+  const auto implicit = parse(with(good, "scheme = \"one-way\"",
+                                   "scheme = \"implicit\"\nacceleration = \"aitken\"\ntolerance = { relative = 1e-4, "
+                                   "force = 0.1 }\non_fail = \"accept\"\nlimits = { energy_made = 2 }"));
+  EXPECT_EQ(implicit.scheme, SchemeKind::serial_implicit);
+  EXPECT_EQ(implicit.implicit.acceleration.kind, AccelerationKind::aitken);
+  EXPECT_EQ(implicit.implicit.relative, 1e-4);
+  EXPECT_EQ(implicit.implicit.force, 0.1);
+  EXPECT_FALSE(implicit.implicit.stops);
+  EXPECT_EQ(implicit.limits.energy_made, 2);
+  expect_refused("scheme = \"one-way\"", "scheme = \"one-way\"\ntolerance = 1e-4",
+                 "has a meaning with scheme = \"implicit\" only");
+  expect_refused("scheme = \"one-way\"", "scheme = \"parallel\"", "allow_unstable_scheme = true");
+  expect_refused("scheme = \"one-way\"", "scheme = \"implicit\"\nmax_iterations = 0", "max_iterations");
 }
 
 TEST(CouplingCase, LoadsAndTheirKeys) {
