@@ -147,7 +147,9 @@ void TwoWay::give_up(const std::vector<double>& residuals, double force_change) 
   for (std::size_t k = 1; k < residuals.size(); ++k) rises += residuals[k] > residuals[k - 1];
   const char* how = overall > 1                                        ? "grows: the coupling is stronger than the relaxation; lower relaxation, or shorten the window"
                     : 3 * rises > static_cast<int>(residuals.size())   ? "goes up and down: contacts may open and close between iterations; shorten the window, or lower relaxation"
-                    : ratio > 0.8                                      ? "creeps: try acceleration = \"iqn-ils\" with reuse = 5, or a larger relaxation"
+                    : ratio > 0.8                                      ? (case_.implicit.acceleration.kind == AccelerationKind::iqn_ils
+                                                                             ? "creeps: a contact may begin or slide between two iterations; give tolerance = { displacement = …, force = … } as well"
+                                                                             : "creeps: try acceleration = \"iqn-ils\", or a larger relaxation")
                                                                        : "falls steadily: raise max_iterations";
   throw Failure("coupler", "iterating",
                 fmt::format("the window from {:.6g} s to {:.6g} s did not converge in {} iterations: the motion's residual went from {:.3g} to {:.3g} m and {}. "
