@@ -22,6 +22,7 @@ STUDIES = {
     "dem_accuracy": "the DEM against closed forms, ODEs, statics and Gomes's piles (2014, chapter 3): error against step and run time",
     "dem_stability": "what steps the particles stand: limits of every law, extremes of every parameter, and whether what breaks says so",
     "dem_speed": "particle-steps per second on a settled bed against LAMMPS and LIGGGHTS; what each feature, thread and triangle costs",
+    "fem": "the structure: error against run time of every element, static and in motion; CalculiX on the same mesh; what a window costs",
 }
 
 
