@@ -92,8 +92,9 @@ struct Cholesky::State {
   FreeUnknowns free;
   cholmod_common common{};
   cholmod_factor* factor = nullptr;
-  cholmod_dense *b = nullptr, *x = nullptr, *work_y = nullptr, *work_e = nullptr;
   double flops = 0;
+  Eigen::VectorXd ordered;  // right-hand side, then solution, in the factor's order
+  Eigen::VectorXd panel;    // of the rows of a supernode
 
   State(const BlockMatrix& matrix_, const Fixed& fixed)
       : matrix(matrix_), dimension(static_cast<std::size_t>(matrix_.dimension())), free(fixed) {
@@ -102,7 +103,6 @@ struct Cholesky::State {
   }
   State(const State&) = delete;
   ~State() {
-    for (auto** dense : {&b, &x, &work_y, &work_e}) cholmod_l_free_dense(dense, &common);
     cholmod_l_free_factor(&factor, &common);
     cholmod_l_finish(&common);
   }
@@ -112,6 +112,7 @@ struct Cholesky::State {
   cholmod_sparse* ordered_matrix();
   double diagonal(std::size_t unknown) const;
   std::optional<std::size_t> first_round_off() const;
+  void substitute();
 
   /// The free unknown at a column of the factor.
   std::size_t unknown_of(std::size_t column) const {
@@ -245,19 +246,76 @@ void Cholesky::factor(const std::vector<Vec3>& points) {
       p[0], p[1], p[2], "xyz"[unknown % s.dimension]));
 }
 
+/// L y = b, then Lᵀ x = y, in place. One right-hand side leaves nothing to compute but what memory brings: the factor is read
+/// as it lies, four columns at a time, twice. The BLAS would be called several times a supernode, most of which are small.
+void Cholesky::State::substitute() {
+  using Columns = Eigen::Map<const Eigen::MatrixXd>;
+  const auto* starts = static_cast<const Index*>(factor->super);
+  const auto* row_starts = static_cast<const Index*>(factor->pi);
+  const auto* value_starts = static_cast<const Index*>(factor->px);
+  const auto* all_rows = static_cast<const Index*>(factor->s);
+  const auto* values = static_cast<const double*>(factor->x);
+  if (panel.size() == 0) {
+    Index most = 0;
+    for (std::size_t s = 0; s < factor->nsuper; ++s) most = std::max(most, row_starts[s + 1] - row_starts[s]);
+    panel.resize(most);
+  }
+  const auto supernodes = static_cast<Index>(factor->nsuper);
+  for (Index s = 0; s < supernodes; ++s) {
+    const Index first = starts[s], columns = starts[s + 1] - first, rows = row_starts[s + 1] - row_starts[s];
+    const auto* row = all_rows + row_starts[s];
+    const Columns L(values + value_starts[s], rows, columns);
+    auto w = panel.head(rows);
+    w.head(columns) = ordered.segment(first, columns);
+    w.tail(rows - columns).setZero();
+    for (Index j = 0; j < columns;) {
+      const Index width = std::min<Index>(4, columns - j), below = j + width;
+      for (Index k = j; k < below; ++k) {
+        for (Index i = j; i < k; ++i) w[k] -= L(k, i) * w[i];
+        w[k] /= L(k, k);
+      }
+      const Index rest = rows - below;
+      if (width == 4)
+        w.tail(rest) -= L.col(j).tail(rest) * w[j] + L.col(j + 1).tail(rest) * w[j + 1] + L.col(j + 2).tail(rest) * w[j + 2] +
+                        L.col(j + 3).tail(rest) * w[j + 3];
+      else
+        for (Index k = j; k < below; ++k) w.tail(rest) -= L.col(k).tail(rest) * w[k];
+      j = below;
+    }
+    ordered.segment(first, columns) = w.head(columns);
+    for (Index r = columns; r < rows; ++r) ordered[row[r]] += w[r];
+  }
+  for (Index s = supernodes - 1; s >= 0; --s) {
+    const Index first = starts[s], columns = starts[s + 1] - first, rows = row_starts[s + 1] - row_starts[s];
+    const auto* row = all_rows + row_starts[s];
+    const Columns L(values + value_starts[s], rows, columns);
+    auto w = panel.head(rows);
+    w.head(columns) = ordered.segment(first, columns);
+    for (Index r = columns; r < rows; ++r) w[r] = ordered[row[r]];
+    for (Index below = columns; below > 0;) {
+      const Index width = std::min<Index>(4, below), j = below - width, rest = rows - below;
+      if (width == 4)
+        w.segment<4>(j).noalias() -= L.block(below, j, rest, 4).transpose() * w.tail(rest);
+      else
+        for (Index k = j; k < below; ++k) w[k] -= L.col(k).tail(rest).dot(w.tail(rest));
+      for (Index k = below - 1; k >= j; --k) {
+        for (Index i = k + 1; i < below; ++i) w[k] -= L(i, k) * w[i];
+        w[k] /= L(k, k);
+      }
+      below = j;
+    }
+    ordered.segment(first, columns) = w.head(columns);
+  }
+}
+
 void Cholesky::solve(const Vector& b, Vector& x) {
   auto& s = *state_;
   const auto count = s.free.unknowns.size();
-  if (!s.b) s.b = cholmod_l_allocate_dense(count, 1, count, CHOLMOD_REAL, &s.common);
-  if (!s.b) out_of_memory("solve with");
-  for (std::size_t i = 0; i < count; ++i)
-    static_cast<double*>(s.b->x)[i] = b[static_cast<Eigen::Index>(s.free.unknowns[i])];
-  if (!cholmod_l_solve2(CHOLMOD_A, s.factor, s.b, nullptr, &s.x, nullptr, &s.work_y, &s.work_e,
-                        &s.common))
-    out_of_memory("solve with");
+  s.ordered.resize(static_cast<Eigen::Index>(count));
+  for (std::size_t j = 0; j < count; ++j) s.ordered[static_cast<Eigen::Index>(j)] = b[static_cast<Eigen::Index>(s.unknown_of(j))];
+  s.substitute();
   x = Vector::Zero(b.size());
-  for (std::size_t i = 0; i < count; ++i)
-    x[static_cast<Eigen::Index>(s.free.unknowns[i])] = static_cast<const double*>(s.x->x)[i];
+  for (std::size_t j = 0; j < count; ++j) x[static_cast<Eigen::Index>(s.unknown_of(j))] = s.ordered[static_cast<Eigen::Index>(j)];
 }
 
 double blas_rate() {
