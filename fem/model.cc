@@ -66,9 +66,11 @@ Supports support(const Settings& settings, const Mesh& mesh) {
     } catch (const std::invalid_argument& error) {
       support.table.fail(error.what());
     }
-  if (!settings.motion)
-    require_supported(settings, mesh, supports.fixed(), settings.table.has("fix") ? "fix" : "move",
-                      "Fix another surface or more directions.");
+  if (settings.motion) return supports;
+  Fixed held = supports.fixed();
+  for (const auto& foundation : settings.foundations) mark(foundation, mesh, held);
+  const auto* key = settings.table.has("fix") ? "fix" : settings.table.has("move") ? "move" : "foundation";
+  require_supported(settings, mesh, held, key, "Fix another surface or more directions.");
   return supports;
 }
 
@@ -82,6 +84,12 @@ Loads load(const Settings& settings, const Mesh& mesh, const Materials& material
 }
 
 }  // namespace
+
+BlockMatrix stiffness_of(const Settings& settings, const Model& model) {
+  auto stiffness = assemble_stiffness(model.mesh, model.materials, settings.formulation);
+  for (const auto& foundation : settings.foundations) add_stiffness(foundation, model.mesh, settings.formulation, stiffness);
+  return stiffness;
+}
 
 void require_supported(const Settings& settings, const Mesh& mesh, const Fixed& fixed,
                        const std::string& key, const std::string& advice) {

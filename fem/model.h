@@ -21,6 +21,9 @@ struct Model {
   Model(const Settings& settings, const Vec3& gravity);
 };
 
+/// Of the body and of the foundations that it stands on [N/m].
+BlockMatrix stiffness_of(const Settings& settings, const Model& model);
+
 /// @throws io::UserError at `key` of the structure when its supports leave it free to move
 void require_supported(const Settings& settings, const Mesh& mesh, const Fixed& fixed,
                        const std::string& key, const std::string& advice);

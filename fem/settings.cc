@@ -111,7 +111,7 @@ std::vector<Settings::Support> read_supports(const io::Table& table, const Setti
   if (table.has("move"))
     for (const auto& [name, move] : table.table("move").named_tables())
       supports.push_back(read_move(move, settings));
-  if (supports.empty() && !settings.motion)
+  if (supports.empty() && settings.foundations.empty() && !settings.motion)
     table.fail("has no table fix: nothing holds the structure. Add [" + table.name() +
                ".fix.SURFACE] for a physical " + (settings.dimension == 2 ? "curve" : "surface") +
                " of the mesh.");
@@ -222,6 +222,10 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   settings.degree = static_cast<int>(table.integer("degree", 1, 2, 2));
   settings.materials = read_materials(table, settings);
   check_densities(settings);
+  settings.foundations = read_foundations(table, settings.mesh.groups, settings.dimension);
+  if (!settings.foundations.empty() && (settings.motion || settings.formulation.large))
+    table.fail("foundation", settings.motion ? "is there for analysis = \"static\" alone. Model the ground as a second material, or leave it out."
+                                             : "is there for displacements = \"small\" alone. Model the ground as a second material, or leave it out.");
   settings.supports = read_supports(table, settings);
   settings.loads = read_loads(table, settings.mesh.groups, settings.dimension);
   settings.solver = read_solver(table);

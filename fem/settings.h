@@ -8,6 +8,7 @@
 
 #include "fem/dynamics.h"
 #include "fem/formulation.h"
+#include "fem/foundation.h"
 #include "fem/linear_solver.h"
 #include "fem/loads.h"
 #include "fem/mesh.h"
@@ -60,6 +61,7 @@ struct Settings {
   int degree = 2;
   std::vector<MaterialOfPart> materials;
   std::vector<Support> supports;
+  std::vector<Foundation> foundations;  ///< of a static structure
   std::vector<Load> loads;
   std::optional<Motion> motion;  ///< empty: static
   SolverOptions solver;

@@ -43,7 +43,7 @@ struct Structure::Body {
 
   Body(const Settings& settings, const Vec3& gravity)
       : model(settings, gravity),
-        stiffness(assemble_stiffness(model.mesh, model.materials, settings.formulation)),
+        stiffness(stiffness_of(settings, model)),
         stress(model.mesh, model.materials, settings.formulation) {
     if (settings.formulation.large) {
       large.emplace(model.mesh, model.materials, model.supports.fixed(), settings.solver,
@@ -218,7 +218,9 @@ void Structure::add_reactions(const Vector& reaction,
 void Structure::check_frequencies() const {
   const auto output = settings_.table.table("output");
   const auto& fixed = body_->model.supports.fixed();
-  const auto motions = free_motions(body_->model.mesh, fixed);
+  Fixed held = fixed;
+  for (const auto& foundation : settings_.foundations) mark(foundation, body_->model.mesh, held);
+  const auto motions = free_motions(body_->model.mesh, held);
   if (!motions.empty())
     output.fail("frequencies",
                 "are asked of a structure that is free to " + motions + ". Fix more.");
@@ -348,7 +350,9 @@ protocol::Advance Structure::advance(const protocol::Window& window,
 std::vector<std::pair<std::string, double>> Structure::quantities(const Response& response) const {
   const int dimension = settings_.dimension;
   std::vector<std::pair<std::string, double>> result;
-  const Vec3 reaction = total(response.reaction, dimension);
+  Vec3 reaction = total(response.reaction, dimension);
+  for (const auto& foundation : settings_.foundations)
+    reaction += force(foundation, body_->model.mesh, settings_.formulation, state_.motion.displacement);
   for (int d = 0; d < dimension; ++d)
     result.emplace_back(std::string("reaction.") + "xyz"[d], reaction[d]);
   for (int d = 0; d < dimension; ++d)
@@ -490,7 +494,7 @@ std::string explain(const Settings& settings) {
   const Model model(settings, Vec3::Zero());
   const auto& mesh = model.mesh;
   const auto& fixed = model.supports.fixed();
-  const auto stiffness = assemble_stiffness(mesh, model.materials, settings.formulation);
+  const auto stiffness = stiffness_of(settings, model);
   // A matrix in motion has the same pattern as the stiffness, and so the same factor.
   const auto solver = choose_solver(stiffness, mesh, fixed, settings.solver);
   const double mass = mass_of(settings, model);

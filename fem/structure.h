@@ -15,7 +15,7 @@ namespace acopla::fem {
 /// An elastic structure under the mean forces of each window, its weight and its own loads: in
 /// static equilibrium with them, or in motion. Receives "force", sends "displacement" and
 /// "velocity" (zero of a static one) on physical surfaces of its mesh, lines in 2D. Reports
-/// reaction.x, .y, .z (force of the supports on the structure), load.x, .y, .z (received forces,
+/// reaction.x, .y, .z (force of the supports and foundations on the structure), load.x, .y, .z (received forces,
 /// weight and loads) [N], displacement.max [m], von_mises.max [Pa], and of a structure in motion
 /// velocity.max [m/s] and, when asked for, energy.kinetic, .strain, .work, .damping and .error [J].
 /// Reactions and loads of a structure in motion are means over the window.

@@ -21,8 +21,8 @@ class Solved {
       : settings_(read_settings(io::Table::from_text(text, "case.toml"), "structure")) {
     if (grid) settings_.mesh.make = [copy = *grid] { return build(copy); };
     model_ = std::make_unique<Model>(settings_, gravity);
-    Statics statics(model_->mesh, model_->materials, model_->supports.fixed(), settings_.solver,
-                    settings_.formulation);
+    const auto stiffness = stiffness_of(settings_, *model_);
+    Statics statics(model_->mesh, stiffness, model_->supports.fixed(), settings_.solver);
     statics.prepare();
     Vector prescribed = model_->mesh.zero();
     model_->supports.place(time, prescribed);

@@ -248,6 +248,16 @@ TEST_F(BadInput, OfMaterialsIsLocatedAndSaysWhatToDo) {
          {"structure.material.sold is not in the mesh.", "Did you mean \"solid\"?"}, "");
   expect(fix, {"poisson", "nearly incompressible", "locking = \"b_bar\""},
          "young = 1e9\npoisson = 0.4999\n");
+  expect(fix, {"case.toml:8:", "structure.material.density = -7850 is outside (0, inf)"}, elastic + "density = -7850\n");
+}
+
+TEST_F(BadInput, OfFoundationsIsLocatedAndSaysWhatToDo) {
+  expect("[structure.foundation.z0]\n", {"case.toml:8:", "stiffness"});
+  expect("[structure.foundation.z0]\nstiffness = 0\n", {"case.toml:9:", "structure.foundation.z0.stiffness"});
+  expect("[structure.foundation.base]\nstiffness = 1e6\n", {"structure.foundation.base is not in the mesh.", "x0, x1, y0"});
+  // springs along the normal of a flat face leave the body to slide
+  expect("[structure.foundation.z0]\nstiffness = 1e6\n", {"structure.foundation leaves the structure free to", "move along x"});
+  expect("[structure.foundation.z0]\nstiffness = 1e6\ndirections = \"all\"\n", {"no error"});
 }
 
 // Velocities of a record in a file: a displacement by the trapezoidal rule, which is exact for it.

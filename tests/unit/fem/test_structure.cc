@@ -132,6 +132,19 @@ TEST_F(AStructure, ReportsPointsAndTheReactionOfEachSupport) {
   EXPECT_NEAR(found.at("reaction.x"), 0, 1e-10 * stress);
 }
 
+// Springs under a block carry its weight, and count with the reactions.
+TEST_F(AStructure, ReactsWithItsFoundation) {
+  auto structure = make("density = 2000\n", "[structure.foundation.z0]\nstiffness = 1e6\ndirections = \"all\"\n");
+  protocol::Run alone = run();
+  alone.uses.clear();
+  structure.start(alone);
+  const auto found = quantities(structure.advance(window(0), {}));
+  const double weight = density * gravity * 2 * 1 * 0.5;
+  EXPECT_NEAR(found.at("load.z"), -weight, 1e-12 * weight);
+  EXPECT_NEAR(found.at("reaction.z"), weight, 1e-11 * weight);
+  EXPECT_NEAR(found.at("reaction.x"), 0, 1e-11 * weight);
+}
+
 // Large displacements: a slender strip under P L²/(E I) = 10 bends to 0.810609 L (Mattiasson 1981),
 // whether in one window or in four, after an iteration that was rejected; small displacements would
 // say 3.33 L.

@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <cstdio>
+#include <memory>
 #include <numbers>
 
 #include "solved.h"
@@ -318,6 +320,68 @@ TEST(AManufacturedSolution, ConvergesWithOrderTwoAndThree) {
     EXPECT_NEAR(std::log2(error(16, 1, triangles) / error(32, 1, triangles)), 2, 0.1) << triangles;
     EXPECT_NEAR(std::log2(error(8, 2, triangles) / error(16, 2, triangles)), 3, 0.15) << triangles;
   }
+}
+
+// Hetényi (1946): a beam with free ends on springs, loaded in its middle, half of it modelled: l = 2, 4, 6 m, λ l = 2.2 to 6.6,
+// y_c = (P λ / 2 k) (cosh λl + cos λl + 2) / (sinh λl + sin λl), y_end = (P λ / 2 k) 4 cosh(λl/2) cos(λl/2) / (sinh λl + sin λl).
+// Euler's beam has no shear, whose share is (λ h)² E / (k_s G) / 4 = 3e-4 of the middle's deflection, h = 0.02 m.
+class ABeamOnSprings : public testing::TestWithParam<double> {};
+
+TEST_P(ABeamOnSprings, DeflectsAsHetenyiSays) {
+  const double length = GetParam(), height = 0.02, width = 0.1, young = 2e11, force = 80, k = 8e4;  // k [N/m²]
+  const double bending = young * width * height * height * height / 12, lambda = std::pow(k / (4 * bending), 0.25);
+  const double x = lambda * length, scale = force * lambda / (2 * k), below = std::sinh(x) + std::sin(x);
+  const double middle = scale * (std::cosh(x) + std::cos(x) + 2) / below, end = scale * 4 * std::cosh(x / 2) * std::cos(x / 2) / below;
+  if (length == 2) {
+    EXPECT_NEAR(middle, 6.271515e-4, 1e-9);
+    EXPECT_NEAR(end, 3.12458e-4, 1e-9);
+  }
+  char text[800];
+  std::snprintf(text, sizeof text,
+                "dimension = 2\n[structure]\nmesh = { bar = { size = [%g, %g], cells = [%d, 1] } }\nplane = \"stress\"\nthickness = %g\n"
+                "[structure.material]\nyoung = %g\npoisson = 0\n[structure.fix.x0]\ndirections = [\"x\"]\n"
+                "[structure.foundation.y0]\nstiffness = %.17g\n[structure.load.x0]\ntraction = [0, %.17g]\n",
+                length / 2, height, static_cast<int>(50 * length), width, young, k / width, -force / 2 / (width * height));
+  const Solved solved(text);
+  EXPECT_NEAR(-solved.at({0, height / 2, 0})[1], middle, 6e-4 * middle);
+  EXPECT_NEAR(-solved.at({length / 2, height / 2, 0})[1], end, 6e-4 * middle);
+}
+INSTANTIATE_TEST_SUITE_P(Lengths, ABeamOnSprings, testing::Values(2.0, 4.0, 6.0));
+
+// Uniform springs under a uniform pressure sink by p / k everywhere, without strain: exact, on faces of either order.
+TEST(AFoundation, SinksEvenlyUnderAnEvenPressure) {
+  for (const int degree : {1, 2}) {
+    const Solved solved("dimension = 3\n[structure]\nmesh = { bar = { size = [2, 1, 0.5], cells = [3, 2, 2] } }\ndegree = " + std::to_string(degree) +
+                        "\n[structure.material]\nyoung = 1e9\npoisson = 0\n[structure.foundation.z0]\nstiffness = 2e6\ndirections = \"all\"\n"
+                        "[structure.load.z0]\ntraction = [0, 0, -1e4]\n");
+    for (std::size_t n = 0; n < solved.mesh().nodes(); ++n)
+      EXPECT_LT((value_at(solved.solution().displacement, n, 3) - Vec3(0, 0, -5e-3)).norm(), 1e-11);
+  }
+}
+
+// A pipe on springs pressed from above and below, whole, half and a quarter of it: the same displacements at the same places, to the
+// round-off of a condition of some 1e4.
+TEST(SymmetricModels, AgreeWholeHalfAndQuarter) {
+  const auto solve = [](int to, int around, const std::string& more) {
+    return std::make_unique<Solved>("dimension = 2\n[structure]\nmesh = { annulus = { inner = 1, outer = 1.5, cells = [2, " + std::to_string(around) + "]" +
+                                    (to < 360 ? ", from = 0, to = " + std::to_string(to) : "") +
+                                    " } }\n[structure.material]\nyoung = 1e7\npoisson = 0.3\n"
+                                    "[structure.foundation.inside]\nstiffness = 1e6\ndirections = \"all\"\n"
+                                    "[structure.load.top]\non = { arc = { from = 45, to = 135, centre = [0, 0], of = \"outside\" } }\npressure = 1e4\n" + more);
+  };
+  const auto whole = solve(360, 32, "[structure.load.bottom]\non = { arc = { from = 225, to = 315, centre = [0, 0], of = \"outside\" } }\npressure = 1e4\n");
+  const auto half = solve(180, 16, "[structure.fix.start]\ndirections = [\"y\"]\n[structure.fix.end]\ndirections = [\"y\"]\n");
+  const auto quarter = solve(90, 8, "[structure.fix.start]\ndirections = [\"y\"]\n[structure.fix.end]\ndirections = [\"x\"]\n");
+  double largest = 0, apart = 0;
+  for (const auto& p : quarter->mesh().points()) {
+    const Vec3 u = quarter->at(p);
+    largest = std::max(largest, u.norm());
+    apart = std::max({apart, (half->at(p) - u).norm(), (whole->at(p) - u).norm()});
+    const Vec3 left(-p[0], p[1], 0);
+    apart = std::max(apart, (half->at(left) - Vec3(-u[0], u[1], 0)).norm());
+  }
+  EXPECT_GT(largest, 1e-4);
+  EXPECT_LT(apart, 1e-11 * largest);
 }
 
 }  // namespace
