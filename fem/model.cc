@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "fem/hanging.h"
+
 namespace acopla::fem {
 namespace {
 
@@ -17,6 +19,10 @@ Mesh make_mesh(const Settings& settings) {
             "= \"b_bar\" needs {}; {} locks with few unknowns whatever is averaged in a cell.",
             mesh.dimension() == 2 ? "quadrilaterals" : "hexahedra",
             mesh.dimension() == 2 ? "a triangle" : "a tetrahedron"));
+  if (const auto at = hanging_node(mesh))
+    settings.table.fail("mesh", fmt::format("has a hanging node at ({:.4g}, {:.4g}, {:.4g}): cells of a finer part touch a coarser one there and nothing "
+                                            "holds them together. Mesh the parts as one (in gmsh: fragment them, or remove duplicate faces), with cells of "
+                                            "the same size where they meet.", (*at)[0], (*at)[1], (*at)[2]));
   return mesh;
 }
 

@@ -251,6 +251,25 @@ TEST_F(BadInput, OfMaterialsIsLocatedAndSaysWhatToDo) {
   expect(fix, {"case.toml:8:", "structure.material.density = -7850 is outside (0, inf)"}, elastic + "density = -7850\n");
 }
 
+// One square on the left, two of half its height on the right, which share its outer corners and not the middle.
+TEST_F(BadInput, OfHangingNodesIsLocatedAndSaysWhatToDo) {
+  const auto path = write_file("hanging.msh",
+                               "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n1 1 \"left\"\n2 2 \"solid\"\n$EndPhysicalNames\n"
+                               "$Nodes\n8\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 1 0.5 0\n6 2 0 0\n7 2 0.5 0\n8 2 1 0\n$EndNodes\n"
+                               "$Elements\n4\n1 1 2 1 1 4 1\n2 3 2 2 1 1 2 3 4\n3 3 2 2 1 2 6 7 5\n4 3 2 2 1 5 7 8 3\n$EndElements\n");
+  for (const int degree : {1, 2}) {
+    const auto text = "dimension = 2\n[structure]\nmesh = \"" + path + "\"\ndegree = " + std::to_string(degree) +
+                      "\n[structure.material]\nyoung = 1\npoisson = 0\n[structure.fix.left]\n";
+    try {
+      const Model model(read_settings(io::Table::from_text(text, "case.toml"), "structure"), Vec3::Zero());
+      FAIL() << "no error";
+    } catch (const io::UserError& error) {
+      EXPECT_NE(std::string(error.what()).find("case.toml:3:"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("structure.mesh has a hanging node at (1, 0.5, 0)"), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST_F(BadInput, OfFoundationsIsLocatedAndSaysWhatToDo) {
   expect("[structure.foundation.z0]\n", {"case.toml:8:", "stiffness"});
   expect("[structure.foundation.z0]\nstiffness = 0\n", {"case.toml:9:", "structure.foundation.z0.stiffness"});
