@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "fem/hyperelastic.h"
 #include "io/error.h"
 
 namespace acopla::fem {
@@ -34,7 +35,8 @@ void add_cells(const Mesh& mesh, const Materials& materials, const Formulation& 
     const auto cell = mesh.cell(c);
     for (int a = 0; a < nodes; ++a)
       moved.col(a) = u.segment<d>(d * Eigen::Index{cell[static_cast<std::size_t>(a)]});
-    const double mu = materials.of(c).mu(), lambda = formulation.lambda(materials.of(c), d);
+    const auto& material = materials.of(c);
+    const double lambda = formulation.lambda(material, d);
     forces.setZero();
     cell_matrix.setZero();
     for (std::size_t q = 0; q < table.points(); ++q) {
@@ -42,18 +44,16 @@ void add_cells(const Mesh& mesh, const Materials& materials, const Formulation& 
       const double weight = table.weights[static_cast<int>(q)] * J.determinant() * depth;
       gradients = (table.gradients[q] * J.inverse()).transpose();
       const Square F = Square::Identity() + moved * gradients.transpose();
-      const Square E = 0.5 * (F.transpose() * F - Square::Identity());
-      const Square S = lambda * E.trace() * Square::Identity() + 2 * mu * E;
-      const Eigen::Matrix<double, d, Eigen::Dynamic> pulled = S * gradients, turned = F * gradients;
-      const Square G = mu * F * F.transpose();
+      const auto law = respond<d>(material, lambda, F);
+      const Eigen::Matrix<double, d, Eigen::Dynamic> pulled = law.S * gradients, pushed = law.push * gradients;
       forces += weight * F * pulled;
       for (int a = 0; a < nodes; ++a)
         for (int b = 0; b < nodes; ++b) {
           const double initial = gradients.col(a).dot(pulled.col(b)),
-                       product = gradients.col(a).dot(gradients.col(b));
+                       product = law.spatial ? pushed.col(a).dot(pushed.col(b)) : gradients.col(a).dot(gradients.col(b));
           auto block = cell_matrix.template block<d, d>(d * a, d * b);
-          block += weight * (lambda * turned.col(a) * turned.col(b).transpose() +
-                             mu * turned.col(b) * turned.col(a).transpose() + product * G);
+          block += weight * (law.lambda * pushed.col(a) * pushed.col(b).transpose() +
+                             law.m * pushed.col(b) * pushed.col(a).transpose() + product * law.G);
           block.diagonal().array() += weight * initial;
         }
     }

@@ -1,4 +1,4 @@
-// Large displacements: total Lagrangian statics of a St. Venant–Kirchhoff solid.
+// Large displacements: total Lagrangian statics.
 #pragma once
 
 #include "fem/elasticity.h"
@@ -10,12 +10,10 @@ namespace acopla::fem {
 /// Internal forces and their derivative at a displacement.
 struct Linearisation {
   Vector internal;  ///< ∫ F S ∇N_a dV [N], over the undeformed body
-  BlockMatrix tangent;  ///< K_ab = ∫ (∇N_a · S ∇N_b) I + F (λ ∇N_a ⊗ ∇N_b + μ ∇N_b ⊗ ∇N_a + μ (∇N_a
-                        ///< · ∇N_b) I) Fᵀ dV [N/m]
+  BlockMatrix tangent;  ///< its derivative [N/m], block by block as Hyperelastic says
 };
 
-/// S = λ tr(E) I + 2 μ E, E = ½ (Fᵀ F − I), F = I + ∇u (Bonet & Wood 2008). Strains must stay
-/// moderate: the law softens in compression. @param pattern  of the stiffness
+/// With F = I + ∇u and the law of each cell's material. @param pattern  of the stiffness
 Linearisation linearise(const Mesh& mesh, const Materials& materials,
                         const Formulation& formulation, const Vector& displacement,
                         const std::shared_ptr<const CoupledNodes>& pattern);

@@ -21,6 +21,12 @@ Material read_material(const io::Table& table, const Formulation& formulation, i
   material.young = table.number("young", io::positive);
   material.poisson = table.number("poisson", poisson_range);
   material.density = table.optional_number("density", io::positive);
+  if (table.choice("law", {"st_venant_kirchhoff", "neo_hooke"}, "st_venant_kirchhoff") == "neo_hooke")
+    material.law = Material::Law::neo_hooke;
+  if (table.has("law") && !formulation.large)
+    table.fail("law", "belongs to displacements = \"large\"; small ones know Hooke's law alone.");
+  if (material.law == Material::Law::neo_hooke && dimension == 2 && formulation.plane == Formulation::Plane::stress)
+    table.fail("law", "= \"neo_hooke\" is there for plane strain and solids, not for plane stress. Use \"st_venant_kirchhoff\", or model the thickness.");
   const bool constrained = dimension == 3 || formulation.plane == Formulation::Plane::strain;
   if (constrained && material.poisson > nearly_incompressible &&
       formulation.locking == Formulation::Locking::untreated)

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fem/hyperelastic.h"
+
 namespace acopla::fem {
 
 double von_mises(const StressVector& s) {
@@ -38,16 +40,15 @@ Stress::Stress(const Mesh& mesh, Materials materials, const Formulation& formula
 
 namespace {
 
-/// σ = F S Fᵀ / det F of a St. Venant–Kirchhoff solid. @param thin  plane stress: F_zz follows from
-/// S_zz = 0
-StressVector cauchy(const Eigen::Matrix3d& slope, double lambda, double mu, bool thin) {
+/// σ = F S Fᵀ / det F. @param thin  plane stress of a St. Venant–Kirchhoff solid: F_zz follows from S_zz = 0
+StressVector cauchy(const Eigen::Matrix3d& slope, double lambda, const Material& material, bool thin) {
   Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + slope;
-  const Eigen::Matrix3d E = 0.5 * (F.transpose() * F - Eigen::Matrix3d::Identity());
-  Eigen::Matrix3d S = lambda * E.trace() * Eigen::Matrix3d::Identity() + 2 * mu * E;
+  Eigen::Matrix3d S = respond<3>(material, lambda, F).S;
   if (thin) {
+    const double strain = 0.5 * ((F.transpose() * F).trace() - 3), mu = material.mu();
     S(2, 2) = 0;
     // The λ' = 2 λ μ / (λ + 2 μ) of plane stress: E_zz = −λ'/(2 μ) tr E.
-    F(2, 2) = std::sqrt(std::max(1e-12, 1 - lambda / mu * E.trace()));
+    F(2, 2) = std::sqrt(std::max(1e-12, 1 - lambda / mu * strain));
   }
   const Eigen::Matrix3d sigma = F * S * F.transpose() / F.determinant();
   StressVector result;
@@ -97,7 +98,7 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> Stress::stress(std::size_t cell, const 
     slope.topLeftCorner<d, d>() = (moved * table.gradients[q]) * inverse;
     if (formulation_.large) {
       result.col(static_cast<int>(q)) =
-          cauchy(slope, lambda, mu, d == 2 && formulation_.plane == Formulation::Plane::stress);
+          cauchy(slope, lambda, material, d == 2 && formulation_.plane == Formulation::Plane::stress);
       continue;
     }
     const double volumetric =

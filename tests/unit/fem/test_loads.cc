@@ -270,6 +270,12 @@ TEST_F(BadInput, OfHangingNodesIsLocatedAndSaysWhatToDo) {
   }
 }
 
+TEST_F(BadInput, OfLawsIsLocatedAndSaysWhatToDo) {
+  const std::string fix = "[structure.fix.z0]\n", elastic = "young = 1e9\npoisson = 0.2\n";
+  expect(fix, {"case.toml:8:", "structure.material.law belongs to displacements"}, elastic + "law = \"neo_hooke\"\n");
+  expect(fix, {"structure.material.law", "neo_hooke"}, elastic + "law = \"neo_hook\"\n");
+}
+
 TEST_F(BadInput, OfFoundationsIsLocatedAndSaysWhatToDo) {
   expect("[structure.foundation.z0]\n", {"case.toml:8:", "stiffness"});
   expect("[structure.foundation.z0]\nstiffness = 0\n", {"case.toml:9:", "structure.foundation.z0.stiffness"});

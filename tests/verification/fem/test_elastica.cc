@@ -54,9 +54,10 @@ TEST(AnElastica, BendsAsEulersCurve) {
 
 // A body turned as a whole has no strain: no internal force, and no stress.
 TEST(LargeDisplacement, OfARigidRotationCostsNothing) {
+  for (const auto law : {Material::Law::st_venant_kirchhoff, Material::Law::neo_hooke})
   for (const int dimension : {2, 3}) {
     const Mesh mesh(build(strip(dimension, 0.3, 3, 2)), 2);
-    const Materials steel = Material{2e11, 0.3, {}};
+    const Materials steel = Material{2e11, 0.3, {}, law};
     const Formulation large{.large = true};
     Vector u = mesh.zero();
     const double angle = 2.0;
@@ -76,9 +77,10 @@ TEST(LargeDisplacement, OfARigidRotationCostsNothing) {
 // At u = 0 the tangent is the stiffness of small displacements; elsewhere it is the derivative of
 // the internal force, to the error of central differences.
 TEST(LargeDisplacement, HasTheDerivativeOfItsForceAsTangent) {
+  for (const auto law : {Material::Law::st_venant_kirchhoff, Material::Law::neo_hooke})
   for (const int dimension : {2, 3}) {
     const Mesh mesh(build(strip(dimension, 0.5, 2, 1)), 2);
-    const Materials soft = Material{1.0, 0.3, {}};
+    const Materials soft = Material{1.0, 0.3, {}, law};
     const auto stiffness = assemble_stiffness(mesh, soft);
     Vector u(mesh.zero()), direction(mesh.zero()), a, b;
     for (Eigen::Index i = 0; i < u.size(); ++i) {
@@ -95,6 +97,60 @@ TEST(LargeDisplacement, HasTheDerivativeOfItsForceAsTangent) {
         (2 * h);
     EXPECT_LT((a - b).norm(), 1e-7 * b.norm());
   }
+}
+
+// A bar of neo-Hooke stretched to twice its length, its sides free: σ_11 = (μ (λ₁² − 1) + λ ln J) / J with J = λ₁ λ₂² and λ₂ from
+// σ_22 = 0, found by bisection. A homogeneous strain is exact in every mesh; Newton stops at 1e-11.
+TEST(NeoHooke, StretchesAsItsClosedFormSays) {
+  const Material rubber{1e6, 0.3, {}, Material::Law::neo_hooke};
+  const double stretch = 2, mu = rubber.mu(), lambda = rubber.lambda();
+  double low = 0.1, high = 1;
+  for (int k = 0; k < 200; ++k) {
+    const double middle = 0.5 * (low + high);
+    (mu * (middle * middle - 1) + lambda * std::log(stretch * middle * middle) > 0 ? high : low) = middle;
+  }
+  const double volume = stretch * low * low;
+  const double sigma = (mu * (stretch * stretch - 1) + lambda * std::log(volume)) / volume;
+  const Mesh mesh(build(strip(3, 0.5, 2, 1)), 1);
+  const Formulation large{.large = true};
+  Fixed fixed(mesh.unknowns(), 0);
+  hold(mesh.boundary("x0"), {true, false, false}, fixed);
+  hold(mesh.boundary("x1"), {true, false, false}, fixed);
+  hold(mesh.boundary("y0"), {false, true, false}, fixed);
+  hold(mesh.boundary("z0"), {false, false, true}, fixed);
+  Vector prescribed = mesh.zero();
+  for (std::size_t n = 0; n < mesh.nodes(); ++n)
+    if (mesh.points()[n][0] == 1) add_at(prescribed, n, 3, Vec3(stretch - 1, 0, 0));
+  const Materials materials(rubber);
+  LargeDisplacements statics(mesh, materials, fixed, {}, large);
+  const auto solution = statics.solve(mesh.zero(), prescribed);
+  EXPECT_NEAR(value_at(solution.displacement, mesh.nearest_node({0, 0.5, 0}), 3)[1], 0.5 * (low - 1), 1e-10);
+  EXPECT_NEAR(Stress(mesh, rubber, large).at_points(0, solution.displacement)(0, 0), sigma, 1e-9 * sigma);
+  double pulled = 0;
+  for (std::size_t n = 0; n < mesh.nodes(); ++n)
+    if (mesh.points()[n][0] == 1) pulled += value_at(solution.reaction, n, 3)[0];
+  EXPECT_NEAR(pulled, sigma * low * low * 0.25, 1e-9 * pulled);
+}
+
+// Pressed to a tenth of its height between rigid sides, neo-Hooke carries (μ (s² − 1) + λ ln s) / s, s = 0.1; St. Venant–Kirchhoff,
+// whose force falls beyond s = 3^-1/2, would be pressed through under the same load.
+TEST(NeoHooke, StandsCompressionToATenth) {
+  const Material rubber{1e6, 0.3, {}, Material::Law::neo_hooke};
+  const double s = 0.1, stress = (rubber.mu() * (s * s - 1) + rubber.lambda() * std::log(s)) / s;
+  const Mesh mesh(build(strip(3, 0.5, 2, 1)), 1);
+  const Formulation large{.large = true};
+  Fixed fixed(mesh.unknowns(), 0);
+  for (const char* side : {"y0", "y1"}) hold(mesh.boundary(side), {false, true, false}, fixed);
+  for (const char* side : {"z0", "z1"}) hold(mesh.boundary(side), {false, false, true}, fixed);
+  hold(mesh.boundary("x0"), {true, false, false}, fixed);
+  Load push(io::Table::from_text("", "case.toml"));
+  push.kind = Load::Kind::traction;
+  push.part.groups = {"x1"};
+  push.value = Vec3(stress, 0, 0);
+  const Materials materials(rubber);
+  LargeDisplacements statics(mesh, materials, fixed, {}, large);
+  const auto solution = statics.solve(nodal_forces(push, mesh, large));
+  EXPECT_NEAR(value_at(solution.displacement, mesh.nearest_node({1, 0, 0}), 3)[0], s - 1, 1e-10);
 }
 
 }  // namespace
