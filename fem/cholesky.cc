@@ -25,6 +25,8 @@ using Index = SuiteSparse_long;
 /// A pivot this small against the diagonal it came from is round-off: the structure is a mechanism.
 /// The softest slender beam of practice keeps about 1e-10.
 constexpr double least_pivot = 1e-14;
+/// Columns of the factor that a substitution takes at a time.
+constexpr int panel_width = 8;
 
 [[noreturn]] void out_of_memory(const std::string& purpose) {
   throw std::runtime_error("not enough memory to " + purpose + " the structure's stiffness");
@@ -247,7 +249,7 @@ void Cholesky::factor(const std::vector<Vec3>& points) {
 }
 
 /// L y = b, then Lᵀ x = y, in place. One right-hand side leaves nothing to compute but what memory brings: the factor is read
-/// as it lies, four columns at a time, twice. The BLAS would be called several times a supernode, most of which are small.
+/// as it lies, some columns at a time, twice. The BLAS would be called several times a supernode, most of which are small.
 void Cholesky::State::substitute() {
   using Columns = Eigen::Map<const Eigen::MatrixXd>;
   const auto* starts = static_cast<const Index*>(factor->super);
@@ -269,15 +271,17 @@ void Cholesky::State::substitute() {
     w.head(columns) = ordered.segment(first, columns);
     w.tail(rows - columns).setZero();
     for (Index j = 0; j < columns;) {
-      const Index width = std::min<Index>(4, columns - j), below = j + width;
+      const Index width = std::min<Index>(panel_width, columns - j), below = j + width;
       for (Index k = j; k < below; ++k) {
         for (Index i = j; i < k; ++i) w[k] -= L(k, i) * w[i];
         w[k] /= L(k, k);
       }
       const Index rest = rows - below;
-      if (width == 4)
-        w.tail(rest) -= L.col(j).tail(rest) * w[j] + L.col(j + 1).tail(rest) * w[j + 1] + L.col(j + 2).tail(rest) * w[j + 2] +
-                        L.col(j + 3).tail(rest) * w[j + 3];
+      if (width == panel_width)
+        w.tail(rest) -= ((L.col(j).tail(rest) * w[j] + L.col(j + 1).tail(rest) * w[j + 1]) +
+                         (L.col(j + 2).tail(rest) * w[j + 2] + L.col(j + 3).tail(rest) * w[j + 3])) +
+                        ((L.col(j + 4).tail(rest) * w[j + 4] + L.col(j + 5).tail(rest) * w[j + 5]) +
+                         (L.col(j + 6).tail(rest) * w[j + 6] + L.col(j + 7).tail(rest) * w[j + 7]));
       else
         for (Index k = j; k < below; ++k) w.tail(rest) -= L.col(k).tail(rest) * w[k];
       j = below;
@@ -293,9 +297,9 @@ void Cholesky::State::substitute() {
     w.head(columns) = ordered.segment(first, columns);
     for (Index r = columns; r < rows; ++r) w[r] = ordered[row[r]];
     for (Index below = columns; below > 0;) {
-      const Index width = std::min<Index>(4, below), j = below - width, rest = rows - below;
-      if (width == 4)
-        w.segment<4>(j).noalias() -= L.block(below, j, rest, 4).transpose() * w.tail(rest);
+      const Index width = std::min<Index>(panel_width, below), j = below - width, rest = rows - below;
+      if (width == panel_width)
+        w.segment<panel_width>(j).noalias() -= L.block(below, j, rest, panel_width).transpose() * w.tail(rest);
       else
         for (Index k = j; k < below; ++k) w[k] -= L.col(k).tail(rest).dot(w.tail(rest));
       for (Index k = below - 1; k >= j; --k) {
