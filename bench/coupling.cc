@@ -5,16 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstring>
-#include <functional>
-#include <mutex>
 #include <thread>
 #include <vector>
 
-#include "coupler/coupler.h"
 #include "coupler/mapping/mapping.h"
-#include "protocol/serve.h"
+#include "tests/integration/in_process.h"
 #include "tests/integration/oscillator.h"
 
 namespace {
@@ -25,26 +21,14 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// Opens the door to the participants, and takes the time of the windows alone.
-class Watch final : public coupler::Reporter {
+// Takes the time of the windows alone.
+class Watch final : public in_process::Door {
  public:
-  void ready(const std::string&) override {
-    const std::lock_guard lock(mutex_);
-    open_ = true;
-    changed_.notify_all();
-  }
   void assembled(double) override { begin_ = Clock::now(); }
   void progress(std::int64_t, std::int64_t, double, double) override { seconds = seconds_since(begin_); }
-  void wait() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return open_; });
-  }
   double seconds = 0;
 
  private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool open_ = false;
   Clock::time_point begin_;
 };
 
@@ -57,26 +41,12 @@ struct Result {
 Result run(double window, std::int64_t windows, const std::string& coupling, protocol::Participant& first, protocol::Participant& second,
            const std::string& address = "inproc") {
   static int runs = 0;
-  zmq::context_t context;
   const auto endpoint = address == "ipc" ? fmt::format("ipc:///tmp/acopla-bench-{}-{}", getpid(), ++runs) : fmt::format("inproc://bench-{}", ++runs);
   const auto text = fmt::format("dimension = 3\nend = {}\n[coupling]\nwindow = {}\nmax_distance = 0.1\n{}\n[[coupling.interface]]\n"
                                 "from = \"first.spring\"\nto = \"second.mass\"\n[first]\ncommand = [\"a\"]\n[second]\ncommand = [\"b\"]\n",
                                 window * static_cast<double>(windows), window, coupling);
-  const auto read = coupler::read_case(io::Table::from_text(text, "case.toml"));
   Watch watch;
-  const auto serve = [&](protocol::Participant& participant, const char* name) {
-    return std::thread([&, name] {
-      watch.wait();
-      try {
-        protocol::serve(participant, {endpoint, name, std::chrono::milliseconds(5000), &context});
-      } catch (const std::exception&) {  // the outcome says it
-      }
-    });
-  };
-  auto one = serve(first, "first"), two = serve(second, "second");
-  auto outcome = coupler::Coupler(context, read, {endpoint, ""}, watch).run();
-  one.join();
-  two.join();
+  auto outcome = in_process::run(text, {{"first", &first}, {"second", &second}}, endpoint, watch);
   return {std::move(outcome), watch.seconds};
 }
 

@@ -117,7 +117,7 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses) {
     coupled_.push_back({use, make_interface(settings_, body_->model.mesh, use.surface)});
-    surfaces.push_back({use.surface, coupled_.back().interface.surface(), {}, {}});
+    surfaces.push_back({use.surface, coupled_.back().interface.surface()});
   }
   seconds_.setup = setup.seconds();
   const Stopwatch factor;

@@ -4,11 +4,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <condition_variable>
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -19,6 +17,7 @@
 #include "protocol/exchange.h"
 #include "protocol/pulse.h"
 #include "protocol/serve.h"
+#include "tests/integration/in_process.h"
 #include "tests/integration/stubs.h"
 
 namespace acopla {
@@ -56,26 +55,13 @@ to = "structure.inside"
 )" + rest;
 }
 
-// Tells when the coupler is open, and keeps the notes.
-class Ear : public coupler::Reporter {
+// Keeps the notes too.
+class Ear : public in_process::Door {
  public:
-  void ready(const std::string&) override {
-    const std::lock_guard lock(mutex_);
-    open_ = true;
-    changed_.notify_all();
-  }
   void note(const std::string& text) override {
     const std::lock_guard lock(mutex_);
     notes_.push_back(text);
     changed_.notify_all();
-  }
-  void close() {
-    const std::lock_guard lock(mutex_);
-    open_ = false;
-  }
-  void wait_until_open() {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::seconds(10), [this] { return open_; });
   }
   std::vector<std::string> notes() {
     const std::lock_guard lock(mutex_);
@@ -83,9 +69,6 @@ class Ear : public coupler::Reporter {
   }
 
  private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool open_ = false;
   std::vector<std::string> notes_;
 };
 
