@@ -123,9 +123,10 @@ void OneWay::note_quantities(const Crew::Answer& answer, std::int64_t window) {
 
 // A load may be the mean of several windows.
 void OneWay::map_forces(const std::string& sender, std::int64_t window,
-                        const protocol::Advance& advance) {
-  std::map<std::string, std::vector<Vec3>> received;
+                        protocol::Advance& advance) {
+  Account::Forces received;
   account_.map_forces(sender, advance, open_[window], received);
+  account_.balance(sender, open_[window], received);
   const auto index = span_of(window);
   if (index < 0) return;
   const auto [start, end] = span(index);

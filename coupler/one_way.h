@@ -37,7 +37,7 @@ class OneWay final : public Scheme {
   void begin_what_can_begin();
   void begin_receiver(const std::string& name, Receiver& receiver);
   void take(Crew::Answer answer);
-  void map_forces(const std::string& sender, std::int64_t window, const protocol::Advance& advance);
+  void map_forces(const std::string& sender, std::int64_t window, protocol::Advance& advance);
   void note_quantities(const Crew::Answer& answer, std::int64_t window);
   bool is_complete(std::int64_t window) const;
   void close_window();

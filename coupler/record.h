@@ -30,6 +30,7 @@ struct LedgerRow {
 struct WindowRecord {
   std::vector<LedgerRow> ledger;                              ///< one per interface of the case
   std::map<std::string, std::vector<geometry::Vec3>> forces;  ///< "grains.box" → one per point [N]
+  std::vector<std::vector<geometry::Vec3>> arrived;  ///< per interface, where several end on one surface: its part there [N]
   std::vector<std::pair<std::string, double>> quantities;     ///< "participant.quantity"
   std::int64_t iterations = 0;  ///< implicit
   double residual = 0;          ///< implicit: of the motion, over that of the window
