@@ -123,9 +123,8 @@ void Account::close(WindowRecord& window) {
   const double end = case_.time(complete_ + 1);
   for (const auto& [name, value] : window.quantities) quantities_.add(name, end, value);
   ++complete_;
-  const auto seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  reporter_.progress(complete_, case_.windows, end, seconds);
+  seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  reporter_.progress(complete_, case_.windows, end, seconds_);
   check_limits(window);
 }
 

@@ -55,6 +55,7 @@ class Account {
   void close(WindowRecord& window);
 
   std::int64_t complete() const { return complete_; }  ///< windows written
+  double seconds() const { return seconds_; }          ///< from begin() to the last of them
   const Ledgers& ledgers() const { return ledgers_; }
   const std::vector<InterfaceOutcome>& interfaces() const { return interfaces_; }
 
@@ -72,6 +73,7 @@ class Account {
   Ledgers ledgers_;
   std::vector<InterfaceOutcome> interfaces_;
   std::chrono::steady_clock::time_point begin_;
+  double seconds_ = 0;
 };
 
 }  // namespace acopla::coupler

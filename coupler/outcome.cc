@@ -51,6 +51,7 @@ Json summary_of(const Outcome& outcome) {
         {"worst_distance", outcome.ledgers.worst_distance}}},
       {"participants", participants_of(outcome)},
       {"seconds", outcome.seconds},
+      {"seconds_windows", outcome.seconds_windows},
       {"error", outcome.error ? Json{{"participant", outcome.error->participant},
                                      {"state", outcome.error->state},
                                      {"message", outcome.error->message}}

@@ -62,7 +62,8 @@ struct Outcome {
   std::vector<InterfaceOutcome> interfaces;
   std::vector<std::pair<std::string, double>>
       quantities;  ///< last value of each, "participant.quantity"
-  double seconds = 0;
+  double seconds = 0;          ///< of the run
+  double seconds_windows = 0;  ///< of its windows, without start and end
   struct Error {
     std::string participant, state, message;
   };
