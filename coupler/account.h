@@ -42,6 +42,10 @@ class Account {
   /// The part of what arrived on a surface that came through one interface.
   const std::vector<geometry::Vec3>& arrived(std::size_t interface, const WindowRecord& window, const Forces& received) const;
 
+  /// How a surface that answers begins, where its motion is recorded.
+  void set_initial(const std::string& surface, std::span<const geometry::Vec3> displacement, std::span<const geometry::Vec3> velocity) {
+    if (case_.record_motion) record_.set_initial(surface, displacement, velocity);
+  }
   void begin();  ///< computing begins
   void flush() { record_.flush(); }  ///< all windows are on disk
   template <class Archive>

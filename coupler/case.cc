@@ -208,9 +208,6 @@ void read_loads(const io::Table& coupling, Case& read) {
         if (read.interfaces[a].from == read.interfaces[b].from && !read.interfaces[a].recorded_only() && !read.interfaces[b].recorded_only())
           throw io::UserError(read.interfaces[a].from_at,
                               fmt::format("{} would be moved by two surfaces. Split it into one surface for each.", read.interfaces[a].from.text()));
-    for (const auto& participant : read.participants)
-      if (participant.replay && read.receives(participant.name))
-        throw io::UserError(participant.at, fmt::format("{} is a record, which cannot answer with its motion. Use scheme = \"one-way\".", participant.name));
     return;
   }
   static const std::map<std::string, Loads> known{{"history", Loads::history}, {"running_mean", Loads::running_mean}, {"mean", Loads::mean},
@@ -283,6 +280,9 @@ void read_coupling(const io::Table& root, Case& read) {
   read.limits.force_loss = limits.number("force_loss", io::non_negative, read.limits.force_loss);
   read.limits.moment_loss = limits.number("moment_loss", io::non_negative, read.limits.moment_loss);
   read.limits.unmapped = limits.integer("unmapped", 0, std::int64_t{1} << 40, read.limits.unmapped);
+  if (coupling.has("record_motion") && read.scheme == SchemeKind::one_way)
+    coupling.fail("record_motion", "has a meaning where surfaces move: with scheme = \"explicit\", \"parallel\" or \"implicit\". Remove it.");
+  read.record_motion = coupling.flag("record_motion", false);
   if (read.scheme != SchemeKind::one_way) read.limits.energy_made = limits.optional_number("energy_made", io::non_negative);
   read_interfaces(coupling, read);
   read_loads(coupling, read);
@@ -318,12 +318,18 @@ void read_expectations(const io::Table& root, Case& read) {
 
 // A substitute without a name stands for the only participant that sends.
 void resolve(const io::Table& root, std::optional<Substitute>& substitute) {
-  std::vector<std::string> senders;
+  std::vector<std::string> senders, movers;
+  const bool moves = root.table("coupling").text("scheme", "one-way") != "one-way";
   for (const auto& interface : root.table("coupling").list("interface")) {
-    const auto from = interface.text("from");
-    const auto owner = from.substr(0, from.find('.'));
-    if (std::find(senders.begin(), senders.end(), owner) == senders.end()) senders.push_back(owner);
+    const auto add_owner = [&](const char* end, std::vector<std::string>& owners) {
+      const auto surface = interface.text(end);
+      const auto owner = surface.substr(0, surface.find('.'));
+      if (std::find(owners.begin(), owners.end(), owner) == owners.end()) owners.push_back(owner);
+    };
+    add_owner("from", senders);
+    if (moves && interface.has("to")) add_owner("to", movers);
   }
+  const auto among = [&](const std::vector<std::string>& owners) { return std::find(owners.begin(), owners.end(), substitute->participant) != owners.end(); };
   if (substitute->participant.empty()) {
     if (senders.size() != 1)
       throw io::UserError(
@@ -331,7 +337,7 @@ void resolve(const io::Table& root, std::optional<Substitute>& substitute) {
           fmt::format("{} participants send forces ({}). Name the one to replay with --as.",
                       senders.size(), fmt::join(senders, ", ")));
     substitute->participant = senders.front();
-  } else if (std::find(senders.begin(), senders.end(), substitute->participant) == senders.end()) {
+  } else if (!among(senders) && !among(movers)) {
     throw io::UserError(
         root.location(),
         fmt::format("{} sends no forces, so it cannot be replayed. Those that do: {}.",

@@ -99,6 +99,7 @@ struct Case {
   double max_distance = 0;        ///< [m]
   double start_limit = 60;        ///< [s]
   std::int64_t output_every = 1;  ///< windows between pictures
+  bool record_motion = false;     ///< two-way: of the surfaces that answer, so that they can be replayed
   std::int64_t checkpoint_every = 0;  ///< windows; 0: none are written
   std::string text;  ///< what it says, but for what may change when a run is resumed; where that can be asked for
   LedgerLimits limits;

@@ -25,6 +25,12 @@ void Record::add_surface(const std::string& name, const geometry::SurfaceMesh& m
   if (resumes_after_ > 0) pictures.keep_until(case_.time(resumes_after_));
 }
 
+void Record::set_initial(const std::string& surface, std::span<const Vec3> displacement, std::span<const Vec3> velocity) {
+  if (!series_) return;
+  series_->add_initial(surface, "displacement", displacement);
+  series_->add_initial(surface, "velocity", velocity);
+}
+
 void Record::set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance) {
   mapping_[interface] = {unmapped, worst_distance};
 }
@@ -42,6 +48,7 @@ void Record::write(std::int64_t index, const WindowRecord& window) {
   constexpr std::size_t most_values = 8u << 20;  // 192 MiB
   pending_.emplace_back(index, window);
   for (const auto& [name, force] : window.forces) pending_values_ += force.size();
+  for (const auto& [name, motion] : window.motion) pending_values_ += 2 * motion.displacement.size();
   if (index + 1 < case_.windows && pending_values_ < most_values && std::chrono::steady_clock::now() - written_ < pause) return;
   write_pending();
 }
@@ -58,6 +65,10 @@ void Record::write_pending() {
 void Record::append(std::int64_t index, const WindowRecord& window) {
   series_->begin_window(case_.time(index), case_.time(index + 1));
   for (const auto& [name, force] : window.forces) series_->add_field(name, "force", force);
+  for (const auto& [name, motion] : window.motion) {
+    series_->add_field(name, "displacement", motion.displacement);
+    series_->add_field(name, "velocity", motion.velocity);
+  }
   for (const auto& [name, value] : window.quantities)
     series_->add_scalar("quantities/" + name, value);
   write_ledger(window);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +33,10 @@ struct WindowRecord {
   std::map<std::string, std::vector<geometry::Vec3>> forces;  ///< "grains.box" → one per point [N]
   std::vector<std::vector<geometry::Vec3>> arrived;  ///< per interface, where several end on one surface: its part there [N]
   std::vector<std::pair<std::string, double>> quantities;     ///< "participant.quantity"
+  struct Motion {
+    std::vector<geometry::Vec3> displacement, velocity;
+  };
+  std::map<std::string, Motion> motion;  ///< of the surfaces that answer, at the window's end [m], [m/s]; where it is asked for
   std::int64_t iterations = 0;  ///< implicit
   double residual = 0;          ///< implicit: of the motion, over that of the window
   bool converged = true;
@@ -45,6 +50,8 @@ class Record {
   /// @param resumes_after  windows that a run before has written there and that stay
   Record(const Case& read, const std::string& folder, std::int64_t resumes_after = 0);
   void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);
+  /// How a surface that answers begins.
+  void set_initial(const std::string& surface, std::span<const geometry::Vec3> displacement, std::span<const geometry::Vec3> velocity);
   /// What does not change: points without a partner, the farthest of those with one.
   void set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance);
   ~Record();

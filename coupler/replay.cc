@@ -64,7 +64,15 @@ std::vector<protocol::Surface> Replay::start(const protocol::Run& run) {
       throw io::UserError({replay_.file, 0, 0},
                           fmt::format("surface {} is not in the record. It holds: {}.", full,
                                       fmt::join(recorded, ", ")));
+    const auto sends = [&](const char* field) { return std::find(use.sends.begin(), use.sends.end(), field) != use.sends.end(); };
     surfaces_.push_back({use.surface, reader_.surface(full)});
+    played_.push_back({use.surface, sends("force"), sends("displacement")});
+    if (!played_.back().moves) continue;
+    if (!reader_.has(full, "displacement"))
+      throw io::UserError({replay_.file, 0, 0}, fmt::format("the record holds no motion of {}. Run the case that makes it with coupling.record_motion = true.", full));
+    const double start = from_ - replay_.at;
+    surfaces_.back().displacement = motion(use.surface, "displacement", start);
+    surfaces_.back().velocity = motion(use.surface, "velocity", start);
   }
   return surfaces_;
 }
@@ -73,7 +81,11 @@ protocol::Advance Replay::advance(const protocol::Window& window,
                                   const std::vector<protocol::Field>&) {
   const double shift = from_ - replay_.at;
   protocol::Advance advance;
-  for (const auto& surface : surfaces_) {
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+    const auto& surface = surfaces_[k];
+    if (played_[k].moves)
+      for (const char* field : {"displacement", "velocity"}) advance.fields.push_back({surface.name, field, motion(surface.name, field, window.end_time() + shift)});
+    if (!played_[k].sends) continue;
     auto force = mean_force(surface.name, surface.mesh.points.size(), window.start_time + shift,
                             window.end_time() + shift);
     geometry::Vec3 sum = geometry::Vec3::Zero();
@@ -86,6 +98,24 @@ protocol::Advance Replay::advance(const protocol::Window& window,
     advance.fields.push_back({surface.name, "force", std::move(force)});
   }
   return advance;
+}
+
+std::vector<geometry::Vec3> Replay::motion(const std::string& surface, const std::string& field, double time) const {
+  const auto full = owner_ + "." + surface;
+  const bool stands = time < from_ || time > to_;
+  time = std::clamp(time, from_, to_);
+  std::size_t next = 0;  // the window whose end is not before that time
+  const double slack = 1e-9 * (to_ - from_);
+  while (next + 1 < reader_.windows() && reader_.window(next).second < time - slack) ++next;
+  const auto [start, end] = reader_.window(next);
+  auto values = reader_.field(full, field, next);
+  if (time < end - slack) {
+    const auto before = next > 0 ? reader_.field(full, field, next - 1) : reader_.initial(full, field);
+    const double share = std::clamp((time - start) / (end - start), 0.0, 1.0);
+    for (std::size_t k = 0; k < values.size(); ++k) values[k] = share * values[k] + (1 - share) * before[k];
+  }
+  if (stands && field == "velocity") std::fill(values.begin(), values.end(), geometry::Vec3::Zero());
+  return values;
 }
 
 std::vector<geometry::Vec3> Replay::mean_force(const std::string& surface, std::size_t points,

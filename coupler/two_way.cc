@@ -45,6 +45,7 @@ TwoWay::TwoWay(const Case& read, Crew& crew, Account& account, Reporter& reporte
     const Vectors none(link.to->points.size(), Vec3::Zero());
     motion.displacement = initial.displacement.empty() ? none : initial.displacement;
     motion.velocity = initial.velocity.empty() ? none : initial.velocity;
+    account_.set_initial(link.about->to.text(), motion.displacement, motion.velocity);
     if (case_.scheme != SchemeKind::serial_implicit && !initial.mass.empty()) masses_[link.about->to.text()] = initial.mass;
   }
   if (case_.scheme == SchemeKind::serial_implicit) acceleration_ = make_acceleration(case_.implicit.acceleration);
@@ -95,7 +96,7 @@ void TwoWay::step_serially(WindowRecord& window) {
   const auto start = std::exchange(now_, std::move(end));
   begun_ = window_ + 1 < std::min(case_.windows, case_.next_checkpoint(window_));
   if (begun_) begin_loaders(window_ + 1, nullptr);
-  book_work(window, window, start, moved_on(start), now_);
+  book(window, window, start, moved_on(start), now_);
 }
 
 void TwoWay::step_in_parallel(WindowRecord& window) {
@@ -105,7 +106,7 @@ void TwoWay::step_in_parallel(WindowRecord& window) {
   begin_loaders(window_, nullptr);
   gather(loaders_.size() + structures_.size(), window, forces, end);
   balance(window);
-  book_work(window, last_, now_, moved_on(now_), end);
+  book(window, last_, now_, moved_on(now_), end);
   now_ = std::move(end);
   last_.forces = window.forces;
   last_.arrived = window.arrived;
@@ -151,7 +152,7 @@ void TwoWay::step_with_iterations(WindowRecord& window) {
       if (settled) window.converged = true;
       acceleration_->end_window();
       balance(window);
-      book_work(window, window, now_, moved_to, end);
+      book(window, window, now_, moved_to, end);
       now_ = std::move(end);
       return;
     }
@@ -314,7 +315,7 @@ void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& ans
 
 // What the coupling makes: the work of the forces on the structure, less that on the surface that sent them, which went another way or,
 // in parallel, felt others. With `conjugate_values` the two are the same for the same motion, on surfaces that do not coincide too.
-void TwoWay::book_work(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const {
+void TwoWay::book(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const {
   for (std::size_t k = 0; k < account_.links().size(); ++k) {
     const auto& link = account_.links()[k];
     if (!link.mapping) continue;
@@ -325,6 +326,8 @@ void TwoWay::book_work(WindowRecord& window, const WindowRecord& acting, const M
     if (acting.forces.empty()) continue;  // nothing acted yet
     row.work_received = work(account_.arrived(k, acting, acting.forces), from, end.at(to).displacement);
   }
+  if (case_.record_motion)
+    for (const auto& [surface, motion] : end) window.motion[surface] = {motion.displacement, motion.velocity};
 }
 
 Eigen::VectorXd TwoWay::flat(const Motions& motions) const {

@@ -57,8 +57,8 @@ class TwoWay final : public Scheme {
   void begin_structures(Forces forces);
   void gather(std::size_t answers, WindowRecord& window, Forces& forces, Motions& motions);
   void balance(WindowRecord& window) const;
-  /// @param acting  whose forces loaded the structures
-  void book_work(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const;
+  /// The work of a window, and its motion where that is asked for. @param acting  whose forces loaded the structures
+  void book(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const;
   Motions moved_on(const Motions& start) const;
   Motion carried(const Link& link, const Motions& motions) const;
   bool agree(const Forces& forces, const Forces& before, double& change) const;

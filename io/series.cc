@@ -166,6 +166,13 @@ void SeriesWriter::add_surface(const std::string& name, const geometry::SurfaceM
                     reinterpret_cast<const std::uint8_t*>(mesh.kinds().data()));
 }
 
+void SeriesWriter::add_initial(const std::string& surface, const std::string& field, std::span<const Vec3> values) {
+  const auto name = fmt::format("/{}/initial", surface);
+  if (H5Lexists(file_->file.get(), name.c_str(), H5P_DEFAULT) > 0 && H5Lexists(file_->file.get(), fmt::format("{}/{}", name, field).c_str(), H5P_DEFAULT) > 0)
+    return;  // a run that is resumed
+  file_->write_once(fmt::format("{}/{}", name, field), H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, {values.size(), 3}, values.empty() ? nullptr : values[0].data());
+}
+
 void SeriesWriter::begin_window(double start, double end) {
   ++file_->windows;
   const std::array<double, 2> row{start, end};
@@ -287,6 +294,18 @@ std::vector<Vec3> SeriesReader::field(const std::string& surface, const std::str
   if (!values.empty() &&
       H5Dread(data.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, values[0].data()) < 0)
     file_->fail(fmt::format("{} cannot be read: the record is damaged. Run the case again.", name));
+  return values;
+}
+
+bool SeriesReader::has(const std::string& surface, const std::string& field) const {
+  return H5Lexists(file_->file.get(), fmt::format("/{}", surface).c_str(), H5P_DEFAULT) > 0 &&
+         H5Lexists(file_->file.get(), fmt::format("/{}/{}", surface, field).c_str(), H5P_DEFAULT) > 0;
+}
+
+std::vector<Vec3> SeriesReader::initial(const std::string& surface, const std::string& field) const {
+  const auto flat = file_->read<double>(fmt::format("/{}/initial/{}", surface, field), H5T_NATIVE_DOUBLE);
+  std::vector<Vec3> values;
+  for (std::size_t k = 0; k + 2 < flat.size(); k += 3) values.emplace_back(flat[k], flat[k + 1], flat[k + 2]);
   return values;
 }
 

@@ -14,6 +14,7 @@ namespace acopla::io {
 /// Writes a file of interface series:
 ///   /SURFACE/points [n,3], /SURFACE/connectivity, /SURFACE/kinds    the reference surface
 ///   /SURFACE/FIELD  [windows, n, 3]                                 one row a window
+///   /SURFACE/initial/FIELD  [points, 3]                             before the first window, where somebody asked for it
 ///   /windows        [windows, 2]                                    start and end [s]
 ///   /TABLE          [windows]                                       scalar columns by group/name
 /// After flush() the file is whole, so that a run that stops leaves what it had. @throws UserError
@@ -27,6 +28,8 @@ class SeriesWriter {
   SeriesWriter& operator=(const SeriesWriter&) = delete;
 
   void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);  ///< unless the file has it already
+  /// What a field is before the first window, once.
+  void add_initial(const std::string& surface, const std::string& field, std::span<const geometry::Vec3> values);
   /// Appends the field's values of the window begun last; one vector per point of the surface.
   void add_field(const std::string& surface, const std::string& field, std::span<const geometry::Vec3> values);
   /// Appends one scalar of the window begun last, e.g. "ledger/force_loss".
@@ -51,6 +54,8 @@ class SeriesReader {
   std::size_t windows() const;
   std::pair<double, double> window(std::size_t index) const;  ///< start and end [s]
   std::vector<geometry::Vec3> field(const std::string& surface, const std::string& field, std::size_t window) const;
+  bool has(const std::string& surface, const std::string& field) const;
+  std::vector<geometry::Vec3> initial(const std::string& surface, const std::string& field) const;
   std::vector<double> scalars(const std::string& name) const;  ///< one per window
 
  private:

@@ -1,9 +1,12 @@
 // Two-way schemes on two masses and three springs, in one process: orders, agreement, energy, and what is said where they fail.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <Eigen/LU>
+#include <filesystem>
 
+#include "coupler/replay.h"
 #include "tests/integration/in_process.h"
 #include "tests/integration/oscillator.h"
 
@@ -246,6 +249,63 @@ TEST(TwoWay, AWindowThatDoesNotConvergeSaysHow) {
                          accepted.first, accepted.second);
   EXPECT_EQ(accepted.outcome.status, Status::met);
   EXPECT_EQ(accepted.outcome.ledgers.not_converged, 16);
+}
+
+// A structure whose motion was recorded plays it again: whoever met it meets the same, bit for bit, in every scheme.
+TEST(TwoWay, ARecordedStructureAnswersAsItDid) {
+  const auto folder = std::filesystem::temp_directory_path() / fmt::format("acopla-replay-{}", getpid());
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const std::string endpoint = "inproc://replayed";
+  oscillator::Loader first, again;
+  oscillator::Structure second;
+  second.u = 0.1;
+  const auto text = case_text(1.0 / 32, 1, "scheme = \"explicit\"\nrecord_motion = true");
+  in_process::Door door;
+  ASSERT_EQ(in_process::run(text, {{"first", &first}, {"second", &second}}, endpoint, door, folder.string()).status, Status::met);
+  for (const char* scheme : {"explicit", "parallel\"\nallow_unstable_scheme = true\n#\"", "implicit"}) {
+    auto played = case_text(1.0 / 32, 1, fmt::format("scheme = \"{}\"", scheme));
+    played.replace(played.find("command = [\"b\"]"), 15, fmt::format("replay = \"{}\"", folder.string()));
+    again = {};
+    in_process::Door other;
+    const auto outcome = in_process::run(played, {{"first", &again}}, fmt::format("{}-{}", endpoint, played.size()), other);
+    ASSERT_EQ(outcome.status, Status::met) << (outcome.error ? outcome.error->message : "");
+    ASSERT_EQ(again.history.size(), first.history.size());
+    if (std::string(scheme) == "implicit") {  // follows the recorded motion on a cubic instead of a straight line
+      for (std::size_t k = 0; k < first.history.size(); ++k) EXPECT_NEAR(again.history[k], first.history[k], 0.1);
+    } else {
+      EXPECT_EQ(again.history, first.history);
+    }
+  }
+  // In windows half as long the structure is between two recorded instants.
+  auto finer = case_text(1.0 / 64, 1, "scheme = \"explicit\"");
+  finer.replace(finer.find("command = [\"b\"]"), 15, fmt::format("replay = \"{}\"", folder.string()));
+  again = {};
+  in_process::Door other;
+  ASSERT_EQ(in_process::run(finer, {{"first", &again}}, endpoint + "-finer", other).status, Status::met);
+  EXPECT_NEAR(again.history.back(), first.history.back(), 0.1);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(TwoWay, ARecordWithoutMotionCannotAnswer) {
+  const auto folder = std::filesystem::temp_directory_path() / fmt::format("acopla-forces-{}", getpid());
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  oscillator::Loader first;
+  oscillator::Structure second;
+  in_process::Door door;
+  ASSERT_EQ(in_process::run(case_text(0.1, 0.2, serial), {{"first", &first}, {"second", &second}}, "inproc://forces", door, folder.string()).status, Status::met);
+  protocol::Run asked;
+  asked.uses = {{"mass", {"force"}, {"displacement", "velocity"}}};
+  try {
+    coupler::Replay({folder.string(), "second", {}, {}, 0}, "second").start(asked);
+    FAIL() << "no error";
+  } catch (const io::UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("the record holds no motion of second.mass. Run the case that makes it with coupling.record_motion = true."),
+              std::string::npos)
+        << error.what();
+  }
+  std::filesystem::remove_all(folder);
 }
 
 TEST(TwoWay, WhatTheCaseAsksWronglyIsSaid) {

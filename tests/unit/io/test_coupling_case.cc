@@ -149,7 +149,14 @@ TEST(CouplingCase, LoadsAndTheirKeys) {
   EXPECT_EQ(snapshot.load_start, 59);
   EXPECT_EQ(parse(with(good, "window = 0.05", "window = 0.05\nloads_from = 2.8")).loads_from, 56);
   expect_refused("window = 0.05", "window = 0.05\nover = 0.2",
-                 "has a meaning with loads = \"mean\" only");
+                 "has a meaning with loads = \"mean\", \"running_mean\" or \"peak\" only");
+  const auto peak = parse(with(good, "window = 0.05", "window = 0.05\nloads = \"peak\"\nat = 2.0"));
+  EXPECT_EQ(peak.load_start, 0);
+  EXPECT_EQ(peak.load_end, 40);
+  EXPECT_EQ(parse(with(good, "window = 0.05", "window = 0.05\nloads = \"running_mean\"\nover = 0.2")).load_windows, 4);
+  expect_refused("window = 0.05", "window = 0.05\nloads = \"running_mean\"", "over");
+  expect_refused("window = 0.05", "window = 0.05\nloads = \"peak\"\nover = 5.0", "reaches further back than the start");
+  expect_refused("window = 0.05", "window = 0.05\nrecord_motion = true", "has a meaning where surfaces move");
   expect_refused("window = 0.05", "window = 0.05\nloads = \"mean\"\nover = 0.07",
                  "is 1.4 windows of 0.05 s");
   expect_refused("window = 0.05", "window = 0.05\nloads = \"mean\"\nat = 3.5", "is after the end");
