@@ -159,8 +159,9 @@ Formulation read_formulation(const io::Table& table, int dimension) {
   if (!formulation.large) return formulation;
   if (formulation.locking == Formulation::Locking::b_bar)
     table.fail("displacements", "= \"large\" and locking = \"b_bar\" do not go together yet.");
-  if (table.text("analysis", "static") == "dynamic")
-    table.fail("displacements", "= \"large\" is there for analysis = \"static\" alone.");
+  for (const char* key : {"newmark", "generalised_alpha"})
+    if (table.has(key))
+      table.fail(key, "belongs to displacements = \"small\": large ones move by the midpoint rule that keeps energy and momentum. Leave it out.");
   return formulation;
 }
 

@@ -10,6 +10,7 @@
 #include "fem/cholesky.h"
 #include "fem/finite_strain.h"
 #include "fem/interface.h"
+#include "fem/large_motion.h"
 #include "fem/model.h"
 #include "fem/modes.h"
 #include "fem/picture.h"
@@ -38,28 +39,34 @@ struct Structure::Body {
   BlockMatrix stiffness;
   Stress stress;
   std::optional<Statics> statics;
-  std::optional<LargeDisplacements> large;  // of a static structure instead
-  std::optional<MassMatrix> mass;           // of a structure in motion, as the next
+  std::optional<LargeDisplacements> large;  // instead, and to start a motion from
+  std::optional<MassMatrix> mass;           // of a structure in motion, as one of the next
   std::optional<Dynamics> dynamics;
+  std::optional<LargeMotion> large_motion;
 
   Body(const Settings& settings, const Vec3& gravity)
       : model(settings, gravity),
         stiffness(stiffness_of(settings, model)),
         stress(model.mesh, model.materials, settings.formulation) {
-    if (settings.formulation.large) {
+    const bool is_large = settings.formulation.large;
+    if (is_large && (!settings.motion || settings.motion->from_equilibrium))
       large.emplace(model.mesh, model.materials, model.supports.fixed(), settings.solver,
                     settings.formulation);
-      return;
-    }
     if (!settings.motion) {
-      statics.emplace(model.mesh, stiffness, model.supports.fixed(), settings.solver);
+      if (!is_large) statics.emplace(model.mesh, stiffness, model.supports.fixed(), settings.solver);
       return;
     }
     mass.emplace(
         assemble_mass(model.mesh, model.materials, settings.formulation, stiffness.pattern()));
-    dynamics.emplace(model.mesh, stiffness, *mass, settings.motion->damping, model.supports,
-                     model.loads, settings.motion->scheme, settings.solver);
+    if (is_large)
+      large_motion.emplace(model.mesh, model.materials, *mass, settings.motion->damping, model.supports,
+                           model.loads, settings.solver, settings.formulation);
+    else
+      dynamics.emplace(model.mesh, stiffness, *mass, settings.motion->damping, model.supports,
+                       model.loads, settings.motion->scheme, settings.solver);
   }
+  bool moves() const { return mass.has_value(); }
+  Energy energy(const Motion& motion) const { return dynamics ? dynamics->energy(motion) : large_motion->energy(motion); }
 };
 
 /// A surface that the coupling uses.
@@ -106,6 +113,17 @@ int steps_in(double length, const std::optional<double>& longest) {
 
 }  // namespace
 
+namespace {
+
+/// A mesh drawn in millimetres is a thousand times too large.
+std::string doubtful_size(const Mesh& mesh) {
+  if (mesh.extent() < 1000) return {};
+  return fmt::format("the mesh is {:.4g} m large. Lengths are metres: was it drawn in millimetres?",
+                     mesh.extent());
+}
+
+}  // namespace
+
 std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   const Stopwatch setup;
   run_ = run;
@@ -115,6 +133,8 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
                          "must be 1 in a coupling: forces between participants in 2D are those of "
                          "a metre of depth.");
   body_ = std::make_unique<Body>(settings_, Vec3(run.gravity[0], run.gravity[1], run.gravity[2]));
+  if (const auto doubt = doubtful_size(body_->model.mesh); !doubt.empty())
+    fmt::print(stderr, "{}: warning: {}.mesh: {}\n", settings_.table.location("mesh").text(), settings_.name, doubt);
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses) {
     coupled_.push_back({use, make_interface(settings_, body_->model.mesh, use.surface)});
@@ -126,7 +146,7 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   find_probes();
   if (body_->statics)
     body_->statics->prepare();
-  else if (body_->dynamics)
+  else if (body_->moves())
     begin_motion();
   seconds_.factor = factor.seconds();
   // What explicit schemes must know; nobody asks where nothing is sent back.
@@ -237,6 +257,7 @@ void Structure::check_frequencies() const {
 void Structure::begin_motion() {
   const auto& [mesh, materials, supports, loads] = body_->model;
   const auto prepare = [&] {
+    if (!body_->dynamics) return;  // large displacements factor in every step
     const double window = run_.time(run_.window);
     body_->dynamics->prepare(window / steps_in(window, settings_.motion->step));
   };
@@ -251,13 +272,18 @@ void Structure::begin_motion() {
     require_supported(
         settings_, mesh, supports.fixed(), "start",
         "There is no equilibrium under its weight and loads: use start = \"rest\", or fix more.");
-    Statics statics(mesh, body_->stiffness, supports.fixed(), settings_.solver);
-    statics.prepare();
-    motion.displacement = statics.solve(load, {}, motion.displacement).displacement;
+    if (body_->large) {
+      motion.displacement = body_->large->solve(load, motion.displacement).displacement;
+      body_->large.reset();  // a motion does without
+    } else {
+      Statics statics(mesh, body_->stiffness, supports.fixed(), settings_.solver);
+      statics.prepare();
+      motion.displacement = statics.solve(load, {}, motion.displacement).displacement;
+    }
   }
   prepare();  // once the factor of the statics is gone
   if (settings_.energy) {
-    state_.passed = body_->dynamics->energy(motion);
+    state_.passed = body_->energy(motion);
     start_energy_ = state_.passed.kinetic + state_.passed.strain;
   }
 }
@@ -328,9 +354,10 @@ Structure::Response Structure::move(const protocol::Window& window, const Vector
   auto& passed = state_.passed;
   state_.motion.time = window.start_time;
   Energy energy;
+  auto* wanted = settings_.energy ? &energy : nullptr;
   Response response{
-      body_->dynamics->advance(state_.motion, force, window.length, steps,
-                               settings_.energy ? &energy : nullptr),
+      body_->dynamics ? body_->dynamics->advance(state_.motion, force, window.length, steps, wanted)
+                      : body_->large_motion->advance(state_.motion, force, window.length, steps, wanted),
       total(force + loads.mean(window.start_time, window.end_time()), mesh.dimension()),
       static_cast<std::uint64_t>(steps)};
   passed = {energy.kinetic, energy.strain, passed.work + energy.work,
@@ -343,7 +370,7 @@ protocol::Advance Structure::advance(const protocol::Window& window,
   if (state_.due) draw();
   const auto force = received_load(received);
   const Stopwatch solve;
-  const auto response = body_->dynamics ? move(window, force) : equilibrate(window, force);
+  const auto response = body_->moves() ? move(window, force) : equilibrate(window, force);
   state_.motion.time = window.end_time();
   state_.due = is_due(window);
   state_.drawn = false;
@@ -462,6 +489,8 @@ std::vector<std::pair<std::string, double>> Structure::finish() {
   if (body_->dynamics) result.emplace_back("factor.bytes", body_->dynamics->solver().factor_bytes);
   if (body_->dynamics)
     result.emplace_back("factorisations", static_cast<double>(body_->dynamics->factorisations()));
+  else if (body_->large_motion)
+    result.emplace_back("factorisations", static_cast<double>(body_->large_motion->factorisations()));
   else
     result.emplace_back("residual", worst_residual_);
   for (auto& frequency : frequencies()) result.push_back(std::move(frequency));
@@ -517,13 +546,6 @@ std::string scheme_of(const Settings::Motion& motion) {
              : fmt::format("Newmark, β = {:.4g}, γ = {:.4g}", scheme.beta, scheme.gamma);
 }
 
-/// A mesh drawn in millimetres is a thousand times too large.
-std::string doubtful_size(const Mesh& mesh) {
-  if (mesh.extent() < 1000) return {};
-  return fmt::format("the mesh is {:.4g} m large. Lengths are metres: was it drawn in millimetres?",
-                     mesh.extent());
-}
-
 double mass_of(const Settings& settings, const Model& model) {
   double mass = 0;
   const Vector unit =
@@ -552,7 +574,9 @@ std::string explain(const Settings& settings) {
       mesh.dimension() == 2 ? "area" : "volume", mesh.volume(), mesh.dimension() == 2 ? "m2" : "m3",
       mass > 0 ? fmt::format("mass {:.6g} kg", mass) : "no density, so no weight");
   if (const auto doubt = doubtful_size(mesh); !doubt.empty()) text += "  warning: " + doubt + "\n";
-  if (settings.motion) text += fmt::format("  time integration: {}\n", scheme_of(*settings.motion));
+  if (settings.motion)
+    text += fmt::format("  time integration: {}\n", settings.formulation.large ? "energy and momentum kept, midpoint rule with Newton's method"
+                                                                            : scheme_of(*settings.motion));
   text += fmt::format("  linear solver: {}, because {}\n",
                       solver.direct ? settings.formulation.large
                                           ? "direct (Cholesky, factored every iteration)"

@@ -224,6 +224,14 @@ TEST_F(BadInput, OfSupportsIsLocatedAndSaysWhatToDo) {
          {"structure.move.x1 contradicts structure.fix.z0: both prescribe the displacement along x "
           "at (1, ",
           "Leave that direction out"});
+  // the same motion at another time is one, the same twice is none
+  const std::string up = "[structure.move.z0]\ndisplacement = [0, 0, 1e-3]\nramp = 1\n";
+  expect(up + "[structure.move.y0]\ndisplacement = [0, 0, 1e-3]\nramp = 2\n",
+         {"structure.move.y0 contradicts structure.move.z0: both prescribe the displacement along z", "choose parts that share no node"});
+  expect(up + "[structure.move.y0]\ndisplacement = [0, 0, 1e-3]\nramp = 1\n", {"no error"});
+  const auto back = write_file("back.csv", "0 0\n2 1\n1 0\n");
+  expect("[structure.move.z0]\nvelocity = [1, 0, 0]\nrecord = \"" + back + "\"\n",
+         {"case.toml:10:", "structure.move.z0.record goes from t = 2 s to t = 1 s. Times must ascend"});
   // what both leave at zero is no contradiction
   expect(
       "[structure.fix.y0]\ndirections = [\"y\"]\n[structure.move.z0]\ndisplacement = [1e-3, 0, "

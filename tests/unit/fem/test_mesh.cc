@@ -12,9 +12,9 @@
 namespace acopla::fem::test {
 namespace {
 
-std::string failure(const std::string& path, int degree = 1) {
+std::string failure(const std::string& path, int degree = 1, int dimension = 3) {
   try {
-    const Mesh mesh(path, degree);
+    const Mesh mesh(path, degree, dimension);
   } catch (const io::UserError& error) {
     return error.what();
   }
@@ -130,6 +130,11 @@ TEST(Reading, RefusesCellsFoldedOverThemselvesAndSaysWhere) {
   const auto text = failure(write_block("folded", {.move = fold}), 2);
   expect_in(text, "folded.msh: has a cell that is folded over itself");
   expect_in(text, "around (");
+  // a quadrilateral whose sides cross
+  const auto crossed = write_file("crossed.msh",
+                                  "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n"
+                                  "$Elements\n1\n1 3 2 1 1 1 2 4 3\n$EndElements\n");
+  expect_in(failure(crossed, 1, 2), "crossed.msh: has a cell that is folded over itself, around (0.5 0.5)");
 }
 
 }  // namespace

@@ -286,5 +286,22 @@ TEST(Explanation, WarnsOfAMeshInMillimetres) {
       << lines;
 }
 
+// A run says it too, in the log of the structure, and goes on.
+TEST_F(AStructure, WarnsOfAMeshInMillimetres) {
+  const auto text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [2000, 100], cells = [2, 1] } }\n"
+      "[structure.material]\nyoung = 1e9\npoisson = 0.2\n[structure.fix.x0]\n";
+  Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  auto alone = run();
+  alone.uses.clear();
+  testing::internal::CaptureStderr();
+  structure.start(alone);
+  const auto said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("case.toml:3:1: warning: structure.mesh: the mesh is 2002 m large. Lengths are metres: was it drawn in millimetres?"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(structure.advance(window(0), {}).steps, 1u);
+}
+
 }  // namespace
 }  // namespace acopla::fem::test
