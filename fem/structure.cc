@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -235,6 +236,23 @@ void Structure::add_reactions(const Vector& reaction,
   }
 }
 
+/// axis · Σ (x − about) × F; where displacements are large, of the places at the window's end.
+void Structure::add_torques(const Response& response, std::vector<std::pair<std::string, double>>& result) const {
+  const auto& mesh = body_->model.mesh;
+  for (const auto& [name, about, axis] : settings_.torques) {
+    double reaction = 0, load = 0;
+    for (std::size_t n = 0; n < mesh.nodes(); ++n) {
+      Vec3 arm = mesh.points()[n] - about;
+      if (settings_.formulation.large) arm += value_at(state_.motion.displacement, n, mesh.dimension());
+      const Vec3 turn = axis.cross(arm);  // axis · (arm × F) = (axis × arm) · F
+      reaction += turn.dot(value_at(response.reaction, n, mesh.dimension()));
+      load += turn.dot(value_at(response.load, n, mesh.dimension()));
+    }
+    result.emplace_back(name + ".torque.reaction", reaction);
+    result.emplace_back(name + ".torque.load", load);
+  }
+}
+
 /// Before hours of a run that they would end in.
 void Structure::check_frequencies() const {
   const auto output = settings_.table.table("output");
@@ -339,13 +357,13 @@ Structure::Response Structure::equilibrate(const protocol::Window& window, const
     worst_residual_ = std::max(worst_residual_, solution.residual);
     motion.displacement = std::move(solution.displacement);
     motion.force = load;
-    return {std::move(solution.reaction), total(load, mesh.dimension()),
+    return {std::move(solution.reaction), load,
             body_->large->iterations() - before};
   }
   auto solution = body_->statics->solve(load, state_.motion.displacement, prescribed);
   worst_residual_ = std::max(worst_residual_, solution.residual);
   state_.motion.displacement = std::move(solution.displacement);
-  return {std::move(solution.reaction), total(load, mesh.dimension()), 1};
+  return {std::move(solution.reaction), load, 1};
 }
 
 Structure::Response Structure::move(const protocol::Window& window, const Vector& force) {
@@ -358,7 +376,7 @@ Structure::Response Structure::move(const protocol::Window& window, const Vector
   Response response{
       body_->dynamics ? body_->dynamics->advance(state_.motion, force, window.length, steps, wanted)
                       : body_->large_motion->advance(state_.motion, force, window.length, steps, wanted),
-      total(force + loads.mean(window.start_time, window.end_time()), mesh.dimension()),
+      force + loads.mean(window.start_time, window.end_time()),
       static_cast<std::uint64_t>(steps)};
   passed = {energy.kinetic, energy.strain, passed.work + energy.work,
             passed.support_work + energy.support_work, passed.damping + energy.damping};
@@ -383,18 +401,20 @@ std::vector<std::pair<std::string, double>> Structure::quantities(const Response
   const int dimension = settings_.dimension;
   std::vector<std::pair<std::string, double>> result;
   Vec3 reaction = total(response.reaction, dimension);
+  const Vec3 load = total(response.load, dimension);
   for (const auto& foundation : settings_.foundations)
     reaction += force(foundation, body_->model.mesh, settings_.formulation, state_.motion.displacement);
   for (int d = 0; d < dimension; ++d)
     result.emplace_back(std::string("reaction.") + "xyz"[d], reaction[d]);
   for (int d = 0; d < dimension; ++d)
-    result.emplace_back(std::string("load.") + "xyz"[d], response.load[d]);
+    result.emplace_back(std::string("load.") + "xyz"[d], load[d]);
   result.emplace_back("displacement.max", largest_length(state_.motion.displacement, dimension));
   if (settings_.motion)
     result.emplace_back("velocity.max", largest_length(state_.motion.velocity, dimension));
   if (settings_.von_mises)
     result.emplace_back("von_mises.max", body_->stress.peak(state_.motion.displacement).value);
   add_reactions(response.reaction, result);
+  add_torques(response, result);
   add_probes(result);
   if (settings_.energy) {
     const auto& [kinetic, strain, work, support_work, damping] = state_.passed;

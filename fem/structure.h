@@ -39,8 +39,7 @@ class Structure : public protocol::Participant {
   struct Coupled;
   /// What a window gave, beside the motion.
   struct Response {
-    Vector reaction;
-    Vec3 load = Vec3::Zero();
+    Vector reaction, load;  ///< of every node [N]
     std::uint64_t steps = 1;
   };
   Vector received_load(const std::vector<protocol::Field>& received) const;
@@ -55,6 +54,7 @@ class Structure : public protocol::Participant {
   void add_probes(std::vector<std::pair<std::string, double>>& result) const;
   void add_reactions(const Vector& reaction,
                      std::vector<std::pair<std::string, double>>& result) const;
+  void add_torques(const Response& response, std::vector<std::pair<std::string, double>>& result) const;
   std::vector<std::pair<std::string, double>> quantities(const Response& response) const;
   std::vector<protocol::Field> fields() const;
   bool is_due(const protocol::Window& window) const;

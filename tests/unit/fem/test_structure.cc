@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -133,6 +134,22 @@ TEST_F(AStructure, ReportsPointsAndTheReactionOfEachSupport) {
 }
 
 // Springs under a block carry its weight, and count with the reactions.
+// Equilibrium of moments: about any axis the supports turn the body back by what the loads turn it. The weight of 2 m³ at the middle of the
+// block, a received pressure of the same resultant line, and a point force at the corner (2, 1, 0.5): about y through (0, 0, 0), z × … by hand.
+TEST_F(AStructure, ReportsTorquesAboutAxes) {
+  auto structure = make("density = 2000\n[structure.load.corner]\npoint_force = [0, 0, -500]\n",
+                        "[structure.fix.z0]\n[structure.output.torque.about_y]\naxis = [0, 2, 0]\n"
+                        "[structure.output.torque.tilted]\nabout = [0.3, -1, 2]\naxis = [1, 2, -1]\n");
+  const auto surfaces = structure.start(run());
+  const auto pressure = traction_loads(surfaces[0].mesh, [](const Vec3&, const Vec3& n) { return Vec3(-1000 * n); });
+  const auto found = quantities(structure.advance(window(0), {{"z1", "force", pressure}}));
+  const double exact = density * 1.0 * gravity * 1.0 + 1000 * 2 * 1.0 + 500 * 2;  // −z forces turn by +x F about y
+  EXPECT_NEAR(found.at("about_y.torque.load"), exact, 1e-10 * exact);
+  EXPECT_NEAR(found.at("about_y.torque.reaction"), -exact, 1e-9 * exact);
+  EXPECT_NEAR(found.at("tilted.torque.reaction"), -found.at("tilted.torque.load"), 1e-9 * exact);
+  EXPECT_GT(std::abs(found.at("tilted.torque.load")), 0.01 * exact);
+}
+
 TEST_F(AStructure, ReactsWithItsFoundation) {
   auto structure = make("density = 2000\n", "[structure.foundation.z0]\nstiffness = 1e6\ndirections = \"all\"\n");
   protocol::Run alone = run();

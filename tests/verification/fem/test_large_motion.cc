@@ -201,7 +201,7 @@ TEST(APendulum, SwingsAsARigidOne) {
 TEST(LargeMotion, TakesItsEnergyFromTheBase) {
   Body body(block(2, {1, 0.05, 0}, {8, 1, 1}), {1e7, 0.3, 1000});
   body.supports.move("base", body.mesh, nodes_of(body.mesh.boundary("x0")), {true, true, false}, Vec3(0, 1, 0),
-                     {.amplitude = Amplitude({{0, 0}, {0.2, 2}, {0.4, -2}, {0.6, 0}}), .velocities = true});
+                     {.amplitude = Amplitude({{0, 0}, {0.2, 2}, {0.4, -2}, {0.6, 0}}), .gives = MotionHistory::Gives::velocities});
   auto dynamics = body.motion();
   auto motion = body.rest();
   double work = 0, most = 0;
