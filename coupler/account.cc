@@ -110,6 +110,7 @@ void Account::close(WindowRecord& window) {
   ledgers_.iterations += window.iterations;
   ledgers_.most_iterations = std::max(ledgers_.most_iterations, window.iterations);
   ledgers_.not_converged += window.converged ? 0 : 1;
+  ledgers_.jumped += window.jumped ? 1 : 0;
   window.energy_made = ledgers_.energy_made;
   record_.write(complete_, window);
   const double end = case_.time(complete_ + 1);

@@ -46,6 +46,7 @@ Json summary_of(const Outcome& outcome) {
         {"iterations", outcome.ledgers.iterations},
         {"most_iterations", outcome.ledgers.most_iterations},
         {"not_converged", outcome.ledgers.not_converged},
+        {"jumped", outcome.ledgers.jumped},
         {"unmapped", outcome.ledgers.unmapped},
         {"worst_distance", outcome.ledgers.worst_distance}}},
       {"participants", participants_of(outcome)},

@@ -29,6 +29,7 @@ struct Ledgers {
   std::int64_t iterations = 0;       ///< of all windows
   std::int64_t most_iterations = 0;  ///< of one window
   std::int64_t not_converged = 0;    ///< windows that were accepted all the same
+  std::int64_t jumped = 0;           ///< windows that ended on one side of a jump of the forces
   std::int64_t unmapped = 0;
   double worst_distance = 0;  ///< [m]
 };

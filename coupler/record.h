@@ -34,6 +34,7 @@ struct WindowRecord {
   std::int64_t iterations = 0;  ///< implicit
   double residual = 0;          ///< implicit: of the motion, over that of the window
   bool converged = true;
+  bool jumped = false;  ///< implicit: it ends on one side of a jump of the forces, the motion known within its tolerance
   double energy_made = 0;  ///< until the window's end [J]
 };
 

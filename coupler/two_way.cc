@@ -110,11 +110,13 @@ void TwoWay::step_with_iterations(WindowRecord& window) {
   everybody.insert(everybody.end(), structures_.begin(), structures_.end());
   crew_.save(everybody);
   acceleration_->begin_window();
+  jump_.begin_window();
   auto assumed = flat(moved_on());
   const auto start = flat(now_);
   std::vector<double> residuals;
   double force_change = 0;
   Forces before;
+  bool settled = false;  // on one side of a jump
   for (int iteration = 1;; ++iteration) {
     if (iteration > 1) crew_.restore(everybody);
     window = {};
@@ -129,33 +131,43 @@ void TwoWay::step_with_iterations(WindowRecord& window) {
     const auto answered = flat(end);
 
     // Motion counts from the window's start, so that a tolerance means the same however far the structure has gone.
-    const double residual = (answered - assumed).norm(), moved = (answered - start).norm();
-    residuals.push_back(residual);
-    const bool motion_agrees = residual <= std::max(settings.relative * moved, settings.displacement);
-    bool forces_agree = true;
-    if (iteration > 1) {
-      double change = 0, size = 0;
-      for (const auto& [surface, values] : forces) {
-        Vectors difference = values;
-        for (std::size_t k = 0; k < values.size(); ++k) difference[k] -= before.at(surface)[k];
-        change = std::hypot(change, size_of(difference));
-        size = std::hypot(size, size_of(values));
-      }
-      force_change = size > 0 ? change / size : 0;
-      forces_agree = change <= std::max(settings.relative * size, settings.force);
-    }
-    window.residual = moved > 0 ? residual / moved : residual;
-    window.converged = motion_agrees && forces_agree;
-    if (!window.converged && iteration >= settings.most_iterations && settings.stops) give_up(residuals, force_change);
-    if (window.converged || iteration >= settings.most_iterations) {
+    const Eigen::VectorXd residual = answered - assumed;
+    const double moved = (answered - start).norm(), tolerance = std::max(settings.relative * moved, settings.displacement);
+    residuals.push_back(residual.norm());
+    const bool forces_agree = iteration == 1 || agree(forces, before, force_change);
+    window.residual = moved > 0 ? residuals.back() / moved : residuals.back();
+    window.converged = residuals.back() <= tolerance && forces_agree;
+    window.jumped = settled && !window.converged;
+    const bool last = iteration >= settings.most_iterations;
+    if (last && settings.stops && !window.converged && !settled) give_up(residuals, force_change);
+    if (window.converged || settled || last) {
+      if (settled) window.converged = true;
       acceleration_->end_window();
       book_work(window, window.forces, end, moved_to);
       now_ = std::move(end);
       return;
     }
-    assumed = acceleration_->next(assumed, answered);
+    const bool enclosed = jump_.enclosed();
+    jump_.note(assumed, residual, tolerance);
+    settled = jump_.closer_than(tolerance);
+    // The acceleration is not shown both sides of a jump: it would take it for a slope.
+    assumed = settled ? jump_.better() : jump_.enclosed() ? jump_.next() : acceleration_->next(assumed, answered);
+    if (jump_.enclosed() && !enclosed) acceleration_->forget();
     before = std::move(forces);
   }
+}
+
+// The first iterations of a window have nothing to be compared with. @param change  of the forces, over their size
+bool TwoWay::agree(const Forces& forces, const Forces& before, double& change) const {
+  double difference = 0, size = 0;
+  for (const auto& [surface, values] : forces) {
+    Vectors apart = values;
+    for (std::size_t k = 0; k < values.size(); ++k) apart[k] -= before.at(surface)[k];
+    difference = std::hypot(difference, size_of(apart));
+    size = std::hypot(size, size_of(values));
+  }
+  change = size > 0 ? difference / size : 0;
+  return difference <= std::max(case_.implicit.relative * size, case_.implicit.force);
 }
 
 void TwoWay::give_up(const std::vector<double>& residuals, double force_change) const {

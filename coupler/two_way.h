@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coupler/acceleration/acceleration.h"
+#include "coupler/acceleration/jump.h"
 #include "coupler/account.h"
 #include "coupler/case.h"
 #include "coupler/crew.h"
@@ -58,6 +59,7 @@ class TwoWay final : public Scheme {
   void book_work(WindowRecord& window, const Forces& acting, const Motions& end, const Motions& moved_to) const;
   Motions moved_on() const;
   Motion carried(const Link& link, const Motions& motions) const;
+  bool agree(const Forces& forces, const Forces& before, double& change) const;
   void give_up(const std::vector<double>& residuals, double force_change) const;
 
   Eigen::VectorXd flat(const Motions& motions) const;
@@ -72,6 +74,7 @@ class TwoWay final : public Scheme {
   Forces last_forces_;   // parallel: on the structures, of the window before
   Forces last_sent_;     // parallel: by the surfaces that sent them
   std::unique_ptr<Acceleration> acceleration_;  // implicit only
+  Jump jump_;
   std::int64_t window_ = 0;
   std::map<std::string, Vectors> masses_;  // of the structures' surfaces that know them; explicit schemes only
   bool warned_ = false;
