@@ -269,6 +269,7 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   settings.solver = read_solver(table);
   const auto output = table.table_or_empty("output");
   settings.vtu = output.flag("vtu", true);
+  settings.hdf5 = output.flag("hdf5", false);
   settings.every = output.optional_number("every", io::positive);
   settings.von_mises = output.flag("von_mises", !settings.motion);
   settings.energy = output.flag("energy", false);

@@ -72,6 +72,7 @@ struct Settings {
   std::optional<Motion> motion;  ///< empty: static
   SolverOptions solver;
   bool vtu = true;
+  bool hdf5 = false;            ///< write the nodal fields of every picture into one file as well
   std::optional<double> every;  ///< time between pictures [s]; empty: the last window only
   bool von_mises = true;        ///< report the largest von Mises stress of every window
   std::vector<Probe> probes;

@@ -440,15 +440,43 @@ bool Structure::is_due(const protocol::Window& window) const {
 void Structure::draw() {
   state_.due = false;
   state_.drawn = true;
-  if (!settings_.vtu || run_.results.empty()) return;
+  if (run_.results.empty() || !(settings_.vtu || settings_.hdf5)) return;
   const auto folder = std::filesystem::path(run_.results);
   std::filesystem::create_directories(folder);
-  const auto file = fmt::format("{}_{:04d}.vtu", settings_.name, ++pictures_);
+  ++pictures_;
+  if (settings_.hdf5) write_nodal((folder / (settings_.name + ".h5")).string());
+  if (!settings_.vtu) return;
+  const auto file = fmt::format("{}_{:04d}.vtu", settings_.name, pictures_);
   const auto& displacement = state_.motion.displacement;
   write_picture((folder / file).string(), body_->model.mesh, displacement,
                 body_->stress.nodal_von_mises(displacement));
   if (!series_) series_.emplace((folder / (settings_.name + ".pvd")).string());
   series_->add(state_.motion.time, (folder / file).string());
+}
+
+/// All nodes as points of the surface "mesh", whose faces are those of the boundary; one row a picture.
+void Structure::write_nodal(const std::string& path) {
+  const auto& mesh = body_->model.mesh;
+  const int dimension = mesh.dimension();
+  if (!nodal_) {
+    geometry::SurfaceMesh nodes;
+    nodes.points = mesh.points();
+    for (const auto& face : mesh.boundary()) nodes.add_face(face.kind, face.used());
+    nodal_ = std::make_unique<io::SeriesWriter>(path);
+    nodal_->add_surface("mesh", nodes);
+  }
+  nodal_->begin_window(state_.motion.time, state_.motion.time);
+  std::vector<Vec3> values(mesh.nodes());
+  const auto add = [&](const std::string& name, const Vector& nodal) {
+    for (std::size_t n = 0; n < values.size(); ++n) values[n] = value_at(nodal, n, dimension);
+    nodal_->add_field("mesh", name, values);
+  };
+  add("displacement", state_.motion.displacement);
+  if (settings_.motion) add("velocity", state_.motion.velocity);
+  const auto stress = body_->stress.nodal(state_.motion.displacement);
+  for (std::size_t n = 0; n < values.size(); ++n) values[n] = principal(stress.col(static_cast<Eigen::Index>(n)));
+  nodal_->add_field("mesh", "principal_stress", values);
+  nodal_->flush();
 }
 
 // A picture of a window is drawn when the next begins, so that a rejected iteration leaves none.
@@ -493,13 +521,17 @@ void Structure::resume(const std::string& folder) {
   reader.finish();
   state_.due = false;
   saved_ = state_;
-  if (!settings_.vtu || run_.results.empty() || pictures_ == 0) return;
-  series_.emplace((std::filesystem::path(run_.results) / (settings_.name + ".pvd")).string());
+  if (run_.results.empty() || pictures_ == 0) return;
+  const auto results = std::filesystem::path(run_.results) / settings_.name;
+  if (settings_.hdf5) nodal_ = std::make_unique<io::SeriesWriter>(results.string() + ".h5", static_cast<std::size_t>(pictures_));
+  if (!settings_.vtu) return;
+  series_.emplace(results.string() + ".pvd");
   series_->keep_until(state_.motion.time);
 }
 
 std::vector<std::pair<std::string, double>> Structure::finish() {
   if (!state_.drawn) draw();
+  nodal_.reset();
   std::vector<std::pair<std::string, double>> result{
       {"seconds.setup", seconds_.setup},
       {"seconds.factor", seconds_.factor},

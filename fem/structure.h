@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fem/settings.h"
+#include "io/series.h"
 #include "io/vtk.h"
 #include "protocol/participant.h"
 
@@ -59,6 +60,7 @@ class Structure : public protocol::Participant {
   std::vector<protocol::Field> fields() const;
   bool is_due(const protocol::Window& window) const;
   void draw();
+  void write_nodal(const std::string& path);
 
   /// What a rejected iteration must undo.
   struct State {
@@ -90,6 +92,7 @@ class Structure : public protocol::Participant {
   double worst_residual_ = 0;
   int pictures_ = 0;
   std::optional<io::PvdSeries> series_;
+  std::unique_ptr<io::SeriesWriter> nodal_;  // when asked for, from the first picture on
 };
 
 /// Plain lines on what a run will do: cells, unknowns, solver, memory, expected time. Reads the

@@ -3,13 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
 
+#include "fem/program.h"
 #include "gmsh_writer.h"
+#include "io/series.h"
 #include "tractions.h"
 
 namespace acopla::fem::test {
@@ -273,6 +277,59 @@ TEST_F(Pictures, OfRejectedIterationsAreNotKept) {
   EXPECT_EQ(count(), 1);
   structure.finish();
   EXPECT_EQ(count(), 1);
+}
+
+// In one file beside or instead of them: the nodal fields at the times of the pictures, and after a resumption the rows until then.
+TEST_F(Pictures, ComeAsRowsOfNumbersOnRequest) {
+  const std::string output = "[structure.load.x1]\npressure = 1e5\namplitude = [[0, 0], [1, 1]]\n[structure.output]\nvtu = false\nhdf5 = true\nevery = 0.02\n";
+  const auto checkpoint = folder_.parent_path() / "checkpoint";
+  std::filesystem::create_directories(checkpoint);
+  auto structure = make(output);
+  const auto surfaces = structure.start(drawing());
+  std::vector<std::vector<Vec3>> sent;
+  for (int w = 0; w < 6; ++w) {
+    sent.push_back(structure.advance(window(w), {}).fields[0].values);
+    if (w == 3) structure.checkpoint(checkpoint.string());
+  }
+  structure.finish();
+  EXPECT_EQ(count(), 0);
+  const auto check = [&] {
+    const io::SeriesReader file((folder_ / "structure.h5").string());
+    ASSERT_EQ(file.windows(), 3u);
+    const auto mesh = file.surface("mesh");
+    for (std::size_t row = 0; row < 3; ++row) {
+      EXPECT_NEAR(file.window(row).second, 0.02 * static_cast<double>(row + 1), 1e-12);
+      const auto moved = file.field("mesh", "displacement", row);
+      for (std::size_t i = 0; i < surfaces[0].mesh.points.size(); ++i) {
+        const auto& p = surfaces[0].mesh.points[i];
+        const auto at = std::find(mesh.points.begin(), mesh.points.end(), p) - mesh.points.begin();
+        EXPECT_EQ(moved.at(static_cast<std::size_t>(at)), sent[2 * row + 1][i]);
+      }
+      const auto principal = file.field("mesh", "principal_stress", row);
+      EXPECT_LT(std::min_element(principal.begin(), principal.end(), [](const Vec3& a, const Vec3& b) { return a[2] < b[2]; })->z(), 0);
+    }
+  };
+  check();
+  auto resumed = make(output);
+  auto again = drawing();
+  again.resumes = true;
+  resumed.start(again);
+  resumed.resume(checkpoint.string());
+  for (int w = 4; w < 6; ++w) resumed.advance(window(w), {});
+  resumed.finish();
+  check();
+}
+
+// Several processes of mpirun would overwrite each other.
+TEST(TheProgram, RefusesToRunSeveralTimesAtOnce) {
+  setenv("OMPI_COMM_WORLD_SIZE", "2", 1);
+  try {
+    program().make(io::Table::from_text("", "case.toml"), "structure");
+    ADD_FAILURE() << "no error";
+  } catch (const io::UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("runs as one process, and mpirun started 2"), std::string::npos) << error.what();
+  }
+  unsetenv("OMPI_COMM_WORLD_SIZE");
 }
 
 TEST_F(Pictures, CanBeTurnedOff) {
