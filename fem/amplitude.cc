@@ -51,13 +51,16 @@ Amplitude::Amplitude(std::vector<std::pair<double, double>> points) : points_(st
   if (points_.empty())
     throw std::invalid_argument("has no points. Give at least one, [[t, value], …].");
   integrals_.assign(points_.size(), 0.0);
+  double_integrals_.assign(points_.size(), 0.0);
   for (std::size_t i = 1; i < points_.size(); ++i) {
     const auto &a = points_[i - 1], &b = points_[i];
     if (!(b.first > a.first))
       throw std::invalid_argument(fmt::format(
           "goes from t = {:.6g} s to t = {:.6g} s. Times must ascend; give a jump a short span.",
           a.first, b.first));
-    integrals_[i] = integrals_[i - 1] + 0.5 * (a.second + b.second) * (b.first - a.first);
+    const double span = b.first - a.first;
+    integrals_[i] = integrals_[i - 1] + 0.5 * (a.second + b.second) * span;
+    double_integrals_[i] = double_integrals_[i - 1] + span * (integrals_[i - 1] + span * (a.second / 3 + b.second / 6));
   }
 }
 
@@ -94,8 +97,47 @@ double Amplitude::integral(double time) const {
   return integrals_[static_cast<std::size_t>(i)] + 0.5 * (y + value(time)) * (time - t);
 }
 
+double Amplitude::double_integral(double time) const {
+  const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(segment(points_, time), 0));
+  const auto& [t, y] = points_[i];
+  const double span = time - t;
+  return double_integrals_[i] + span * (integrals_[i] + span * (y / 3 + value(time) / 6));
+}
+
 double Amplitude::mean(double start, double end) const {
   return end > start ? (integral(end) - integral(start)) / (end - start) : value(start);
+}
+
+double MotionHistory::displacement(double time) const {
+  if (gives == Gives::displacements) return amplitude.value(time);
+  if (gives == Gives::velocities) return amplitude.integral(time);
+  const double begin = amplitude.points().front().first, end = amplitude.points().back().first;
+  if (time <= begin) return 0;
+  return amplitude.double_integral(std::min(time, end)) + std::max(0.0, time - end) * amplitude.integral(end);
+}
+
+double MotionHistory::velocity(double time) const {
+  if (gives == Gives::displacements) return amplitude.rate(time);
+  if (gives == Gives::velocities) return amplitude.value(time);
+  const double begin = amplitude.points().front().first, end = amplitude.points().back().first;
+  return amplitude.integral(std::clamp(time, begin, end));
+}
+
+double MotionHistory::acceleration(double time) const {
+  if (gives == Gives::displacements) return 0;
+  if (gives == Gives::velocities) return amplitude.rate(time);
+  return time < amplitude.points().front().first || time > amplitude.points().back().first ? 0 : amplitude.value(time);
+}
+
+Amplitude correct_baseline(const Amplitude& accelerations) {
+  auto points = accelerations.points();
+  const double begin = points.front().first, end = points.back().first, span = end - begin;
+  if (!(span > 0)) return accelerations;
+  // ∫ c₀ + c₁ t = c₀ T + c₁ T²/2 = V and ∬ = c₀ T²/2 + c₁ T³/6 = U, with t from the first point.
+  const double V = accelerations.integral(end) / span, U = accelerations.double_integral(end) / (span * span);
+  const double c0 = 6 * U - 2 * V, c1 = (6 * V - 12 * U) / span;
+  for (auto& [time, value] : points) value -= c0 + c1 * (time - begin);
+  return Amplitude(std::move(points));
 }
 
 Amplitude read_amplitude(const io::Table& table) {

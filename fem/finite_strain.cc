@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -21,47 +22,99 @@ constexpr int most_iterations = 25;
 /// Smallest part of a load that a step may be.
 constexpr double smallest_step = 1.0 / 1024;
 
+/// Stress of a point, the gradient that carries it, and the laws whose derivatives it has.
 template <int d>
-void add_cells(const Mesh& mesh, const Materials& materials, const Formulation& formulation,
-               const Vector& u, Linearisation& result) {
+struct PointForce {
+  using Square = Eigen::Matrix<double, d, d>;
+  Square F, S;
+  std::array<Hyperelastic<d>, 2> laws;
+  int count = 1;
+};
+
+/// Visits the quadrature points. @param fields  displacements; @param visit  (cell, the deformation gradient of each field, ∇N_a as
+/// [d, node], weight [m³])
+template <int d, std::size_t n, class Visit>
+void visit_points(const Mesh& mesh, const Formulation& formulation, const std::array<const Vector*, n>& fields, const Visit& visit) {
   using Square = Eigen::Matrix<double, d, d>;
   const auto& table = mesh.element().stiffness;
   const auto nodes = mesh.element().nodes;
   const double depth = d == 2 ? formulation.thickness : 1;
-  Eigen::Matrix<double, d, Eigen::Dynamic> moved(d, nodes), gradients(d, nodes), forces(d, nodes);
-  Eigen::MatrixXd cell_matrix(d * nodes, d * nodes);
+  std::array<Eigen::Matrix<double, d, Eigen::Dynamic>, n> moved;
+  for (auto& m : moved) m.resize(d, nodes);
+  Eigen::Matrix<double, d, Eigen::Dynamic> gradients(d, nodes);
+  std::array<Square, n> F;
   for (std::size_t c = 0; c < mesh.cells(); ++c) {
     const auto x = mesh.positions<d>(c);
     const auto cell = mesh.cell(c);
-    for (int a = 0; a < nodes; ++a)
-      moved.col(a) = u.segment<d>(d * Eigen::Index{cell[static_cast<std::size_t>(a)]});
-    const auto& material = materials.of(c);
-    const double lambda = formulation.lambda(material, d);
-    forces.setZero();
-    cell_matrix.setZero();
+    for (std::size_t f = 0; f < n; ++f)
+      for (int a = 0; a < nodes; ++a)
+        moved[f].col(a) = fields[f]->template segment<d>(d * Eigen::Index{cell[static_cast<std::size_t>(a)]});
     for (std::size_t q = 0; q < table.points(); ++q) {
       const Square J = x * table.gradients[q];
       const double weight = table.weights[static_cast<int>(q)] * J.determinant() * depth;
       gradients = (table.gradients[q] * J.inverse()).transpose();
-      const Square F = Square::Identity() + moved * gradients.transpose();
-      const auto law = respond<d>(material, lambda, F);
-      const Eigen::Matrix<double, d, Eigen::Dynamic> pulled = law.S * gradients, pushed = law.push * gradients;
-      forces += weight * F * pulled;
-      for (int a = 0; a < nodes; ++a)
-        for (int b = 0; b < nodes; ++b) {
-          const double initial = gradients.col(a).dot(pulled.col(b)),
-                       product = law.spatial ? pushed.col(a).dot(pushed.col(b)) : gradients.col(a).dot(gradients.col(b));
-          auto block = cell_matrix.template block<d, d>(d * a, d * b);
-          block += weight * (law.lambda * pushed.col(a) * pushed.col(b).transpose() +
-                             law.m * pushed.col(b) * pushed.col(a).transpose() + product * law.G);
-          block.diagonal().array() += weight * initial;
-        }
+      for (std::size_t f = 0; f < n; ++f) F[f] = Square::Identity() + moved[f] * gradients.transpose();
+      visit(c, F, gradients, weight);
     }
-    for (int a = 0; a < nodes; ++a)
-      result.internal.segment<d>(d * Eigen::Index{cell[static_cast<std::size_t>(a)]}) +=
-          forces.col(a);
-    result.tangent.add(cell, cell_matrix);
   }
+}
+
+/// Adds forces and, where there is a tangent, the blocks of the laws. @param respond_at  (cell, deformation gradients, weight) → PointForce
+template <int d, std::size_t n, class Respond>
+void add_cells(const Mesh& mesh, const Formulation& formulation, const std::array<const Vector*, n>& fields,
+               const Respond& respond_at, Vector& internal, BlockMatrix* tangent) {
+  const auto nodes = mesh.element().nodes;
+  const auto last = mesh.element().stiffness.points() - 1;
+  Eigen::Matrix<double, d, Eigen::Dynamic> forces(d, nodes), pulled(d, nodes), pushed(d, nodes);
+  forces.setZero();
+  Eigen::MatrixXd cell_matrix = Eigen::MatrixXd::Zero(d * nodes, d * nodes);
+  std::size_t point = 0;
+  visit_points<d>(mesh, formulation, fields, [&](std::size_t c, const auto& F, const auto& gradients, double weight) {
+    const PointForce<d> at = respond_at(c, F, weight);
+    pulled = at.S * gradients;
+    forces += weight * at.F * pulled;
+    if (tangent) {
+      for (int a = 0; a < nodes; ++a)
+        for (int b = 0; b < nodes; ++b)
+          cell_matrix.template block<d, d>(d * a, d * b).diagonal().array() += weight * gradients.col(a).dot(pulled.col(b));
+      for (int k = 0; k < at.count; ++k) {
+        const auto& law = at.laws[static_cast<std::size_t>(k)];
+        pushed = law.push * gradients;
+        for (int a = 0; a < nodes; ++a)
+          for (int b = 0; b < nodes; ++b) {
+            const double product = law.spatial ? pushed.col(a).dot(pushed.col(b)) : gradients.col(a).dot(gradients.col(b));
+            cell_matrix.template block<d, d>(d * a, d * b) +=
+                weight * (law.lambda * pushed.col(a) * pushed.col(b).transpose() +
+                          law.m * pushed.col(b) * pushed.col(a).transpose() + product * law.G);
+          }
+      }
+    }
+    if (point++ < last) return;
+    point = 0;
+    const auto cell = mesh.cell(c);
+    for (int a = 0; a < nodes; ++a)
+      internal.segment<d>(d * Eigen::Index{cell[static_cast<std::size_t>(a)]}) += forces.col(a);
+    if (tangent) tangent->add(cell, cell_matrix);
+    forces.setZero();
+    cell_matrix.setZero();
+  });
+}
+
+/// ΔC below which the second part of S̄ is left out: it is of the order λ |ΔC|², and its round-off of λ 1e-16 / |ΔC|.
+constexpr double smallest_strain = 1e-5;
+
+/// S̄ of a step (Gonzalez 2000, eq. 43).
+template <int d>
+Eigen::Matrix<double, d, d> step_stress(const Material& material, double lambda, const Eigen::Matrix<double, d, d>& C0,
+                                        const Eigen::Matrix<double, d, d>& C1) {
+  using Square = Eigen::Matrix<double, d, d>;
+  const Square change = C1 - C0;
+  Square S = stress_of<d>(material, lambda, 0.5 * (C0 + C1));
+  const double square = change.squaredNorm();
+  if (material.law == Material::Law::st_venant_kirchhoff || square < smallest_strain * smallest_strain) return S;
+  const double gap = energy_of<d>(material, lambda, C1) - energy_of<d>(material, lambda, C0) - 0.5 * S.cwiseProduct(change).sum();
+  S += 2 * gap / square * change;
+  return S;
 }
 
 }  // namespace
@@ -70,9 +123,52 @@ Linearisation linearise(const Mesh& mesh, const Materials& materials,
                         const Formulation& formulation, const Vector& displacement,
                         const std::shared_ptr<const CoupledNodes>& pattern) {
   Linearisation result{mesh.zero(), BlockMatrix(pattern, mesh.dimension())};
-  with_dimension(mesh.dimension(),
-                 [&](auto d) { add_cells<d>(mesh, materials, formulation, displacement, result); });
+  with_dimension(mesh.dimension(), [&](auto d) {
+    const auto respond_at = [&](std::size_t c, const auto& F, double) -> PointForce<d> {
+      const auto& material = materials.of(c);
+      const auto law = respond<d>(material, formulation.lambda(material, d), F[0]);
+      return {F[0], law.S, {law}};
+    };
+    add_cells<d, 1>(mesh, formulation, {&displacement}, respond_at, result.internal, &result.tangent);
+  });
   return result;
+}
+
+StepForce step_force(const Mesh& mesh, const Materials& materials, const Formulation& formulation,
+                     const Vector& u0, const Vector& u1, double viscosity, BlockMatrix* tangent) {
+  StepForce result{mesh.zero()};
+  if (tangent) *tangent = BlockMatrix(tangent->pattern(), mesh.dimension());
+  with_dimension(mesh.dimension(), [&](auto d) {
+    using Square = Eigen::Matrix<double, d, d>;
+    const auto respond_at = [&](std::size_t c, const auto& F, double weight) -> PointForce<d> {
+      const auto& material = materials.of(c);
+      const double lambda = formulation.lambda(material, d), mu = material.mu();
+      const Square C0 = F[0].transpose() * F[0], C1 = F[1].transpose() * F[1], mean = 0.5 * (F[0] + F[1]);
+      PointForce<d> at{mean, step_stress<d>(material, lambda, C0, C1), {}};
+      if (tangent) at.laws[0] = respond<d>(material, lambda, mean);
+      if (viscosity == 0) return at;
+      const Square strain = 0.5 * (C1 - C0),
+                   viscous = viscosity * (lambda * strain.trace() * Square::Identity() + 2 * mu * strain);
+      result.dissipation += weight * viscous.cwiseProduct(strain).sum();
+      at.S += viscous;
+      at.laws[1] = {viscous, mean, 2 * viscosity * mu * mean * mean.transpose(), 2 * viscosity * lambda, 2 * viscosity * mu, false};
+      at.count = 2;
+      return at;
+    };
+    add_cells<d, 2>(mesh, formulation, {&u0, &u1}, respond_at, result.internal, tangent);
+  });
+  return result;
+}
+
+double strain_energy(const Mesh& mesh, const Materials& materials, const Formulation& formulation, const Vector& displacement) {
+  double sum = 0;
+  with_dimension(mesh.dimension(), [&](auto d) {
+    visit_points<d, 1>(mesh, formulation, {&displacement}, [&](std::size_t c, const auto& F, const auto&, double weight) {
+      const auto& material = materials.of(c);
+      sum += weight * energy_of<d>(material, formulation.lambda(material, d), F[0].transpose() * F[0]);
+    });
+  });
+  return sum;
 }
 
 LargeDisplacements::LargeDisplacements(const Mesh& mesh, const Materials& materials,

@@ -18,6 +18,21 @@ Linearisation linearise(const Mesh& mesh, const Materials& materials,
                         const Formulation& formulation, const Vector& displacement,
                         const std::shared_ptr<const CoupledNodes>& pattern);
 
+/// Internal forces of a step of LargeMotion from u₀ to u₁.
+struct StepForce {
+  Vector internal;         ///< ∫ F_m (S̄ + S_v) ∇N_a dV [N], S_v = viscosity · 𝓒 : ΔE
+  double dissipation = 0;  ///< ∫ S_v : ΔE dV [J] ≥ 0
+};
+
+/// @param viscosity  c_b / Δt of the stress S_v
+/// @param tangent  when not null, overwritten by twice the derivative of `internal` by u₁, made symmetric by taking F_m for F₁ in it: of
+/// small steps and displacements the stiffness times 1 + 2 viscosity
+StepForce step_force(const Mesh& mesh, const Materials& materials, const Formulation& formulation,
+                     const Vector& u0, const Vector& u1, double viscosity, BlockMatrix* tangent);
+
+/// ∫ W dV [J] over the undeformed body.
+double strain_energy(const Mesh& mesh, const Materials& materials, const Formulation& formulation, const Vector& displacement);
+
 /// Equilibrium f_int(u) = f by Newton's method with a line search, in as many steps of the load as
 /// it takes. Loads keep their direction and the area that they were given on. All given must
 /// outlive it.

@@ -90,30 +90,41 @@ class Scanner {
   int line_ = 1;
 };
 
-/// Number of nodes of an element type of gmsh that is read or passed over.
-std::size_t nodes_of_type(const Scanner& scanner, std::int64_t type) {
-  switch (type) {
-    case 15:
-      return 1;  // point
-    case 1:
-      return 2;  // line
-    case 2:
-      return 3;  // triangle
-    case 3:
-      return 4;  // quadrangle
-    case 4:
-      return 4;  // tetrahedron
-    case 5:
-      return 8;  // hexahedron
-    case 6:
-    case 7:
-      scanner.fail("prisms and pyramids cannot be used. Mesh with hexahedra or with tetrahedra.");
-    default:
-      scanner.fail(
-          fmt::format("elements of gmsh's type {} cannot be used. Save elements of first order "
-                      "(Mesh.ElementOrder = 1); `degree` in the case sets the order.",
-                      type));
-  }
+/// An element type of gmsh that is read or passed over.
+struct ElementType {
+  int dimension = 0;
+  bool simplex = false;
+  std::size_t corners = 0;
+  /// Of second order: the corners that each further node is in the middle of, in gmsh's order; a cell's own node has none.
+  std::vector<std::vector<std::size_t>> middles = {};
+  std::size_t nodes() const { return corners + middles.size(); }
+};
+
+const ElementType& element_type(const Scanner& scanner, std::int64_t type) {
+  static const std::unordered_map<std::int64_t, ElementType> types{
+      {15, {0, false, 1}},  // point
+      {1, {1, false, 2}},   // line
+      {2, {2, true, 3}},    // triangle
+      {3, {2, false, 4}},   // quadrangle
+      {4, {3, true, 4}},    // tetrahedron
+      {5, {3, false, 8}},   // hexahedron
+      {8, {1, false, 2, {{}}}},
+      {9, {2, true, 3, {{0, 1}, {1, 2}, {2, 0}}}},
+      {10, {2, false, 4, {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {}}}},
+      {11, {3, true, 4, {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}}}},
+      {12, {3, false, 8, {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3}, {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7},
+                          {0, 1, 2, 3}, {0, 1, 5, 4}, {0, 3, 7, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {4, 5, 6, 7}, {}}}}};
+  const auto found = types.find(type);
+  if (found != types.end()) return found->second;
+  if (type == 6 || type == 7 || type == 13 || type == 14 || type == 18 || type == 19)
+    scanner.fail("prisms and pyramids cannot be used. Mesh with hexahedra or with tetrahedra.");
+  if (type == 16 || type == 17)
+    scanner.fail(fmt::format("{} have no nodes in the middle of {}, where the cells of second order here do. Save complete ones "
+                             "(Mesh.SecondOrderIncomplete = 0).",
+                             type == 16 ? "quadrilaterals of 8 nodes" : "hexahedra of 20 nodes", type == 16 ? "the cell" : "faces and cell"));
+  scanner.fail(fmt::format("elements of gmsh's type {} cannot be used. Save elements of first or second order (Mesh.ElementOrder = 1 or 2); "
+                           "`degree` in the case sets the order of the displacements.",
+                           type));
 }
 
 class Reader {
@@ -233,33 +244,49 @@ class Reader {
   }
 
   void read_element(std::int64_t type, const std::vector<int>& groups) {
-    std::array<std::uint32_t, 8> nodes{};
-    const auto count = nodes_of_type(in_, type);
-    for (std::size_t i = 0; i < count; ++i) {
+    const auto& kind = element_type(in_, type);
+    std::array<std::uint32_t, 27> all{};
+    for (std::size_t i = 0; i < kind.nodes(); ++i) {
       const auto tag = in_.integer();
       const auto found = index_of_.find(tag);
       if (found == index_of_.end()) in_.fail(fmt::format("there is no node {}.", tag));
-      nodes[i] = found->second;
+      all[i] = found->second;
     }
-    const int dimension = type == 15 ? 0 : type == 1 ? 1 : type <= 3 ? 2 : 3;
-    if (dimension > mesh_.dimension)
+    std::array<std::uint32_t, 8> nodes{};
+    std::copy_n(all.begin(), kind.corners, nodes.begin());
+    if (kind.dimension > mesh_.dimension)
       in_.fail(
           "has solid cells, but the case says dimension = 2. A structure in 2D is meshed in the "
           "plane z = 0.");
-    if (dimension == mesh_.dimension) {
-      add_cell(type == 2 || type == 4, nodes, groups);
+    if (kind.dimension == mesh_.dimension) {
+      add_cell(kind.simplex, nodes, groups);
+      add_middles(kind, all);
       return;
     }
-    if (dimension == 0) {
+    if (kind.dimension == 0) {
       for (const int group : groups) mesh_.places[group].push_back(nodes[0]);
       return;
     }
     FaceKey key;
     key.fill(no_corner);
-    std::copy_n(nodes.begin(), count, key.begin());
+    std::copy_n(nodes.begin(), kind.corners, key.begin());
     std::sort(key.begin(), key.end());
-    auto& parts = dimension + 1 == mesh_.dimension ? mesh_.boundaries : mesh_.curves;
+    auto& parts = kind.dimension + 1 == mesh_.dimension ? mesh_.boundaries : mesh_.curves;
     for (const int group : groups) parts[group].push_back(key);
+  }
+
+  void add_middles(const ElementType& kind, const std::array<std::uint32_t, 27>& nodes) {
+    for (std::size_t m = 0; m < kind.middles.size(); ++m) {
+      const auto& point = mesh_.points[nodes[kind.corners + m]];
+      FaceKey key;
+      key.fill(no_corner);
+      for (std::size_t c = 0; c < kind.middles[m].size(); ++c) key[c] = nodes[kind.middles[m][c]];
+      std::sort(key.begin(), key.end());
+      if (kind.middles[m].empty())
+        centre_of_.emplace(mesh_.cells.size() - 1, point);
+      else
+        mesh_.middles.emplace(key, point);
+    }
   }
 
   void add_cell(bool simplex, std::array<std::uint32_t, 8> nodes, const std::vector<int>& groups) {
@@ -311,7 +338,7 @@ class Reader {
     if (mesh_.dimension == 3) return;
     double extent = 0;
     for (const auto& p : mesh_.points) extent = std::max({extent, std::abs(p[0]), std::abs(p[1])});
-    for (auto& p : mesh_.points) {
+    const auto flatten = [&](Vec3& p) {
       if (std::abs(p[2]) > 1e-9 * extent)
         in_.fail_whole(
             fmt::format("has a node at ({:.6g}, {:.6g}, {:.6g}), off the plane z = 0. A structure "
@@ -319,7 +346,10 @@ class Reader {
                         "plane.",
                         p[0], p[1], p[2]));
       p[2] = 0;
-    }
+    };
+    for (auto& p : mesh_.points) flatten(p);
+    for (auto& [key, p] : mesh_.middles) flatten(p);
+    for (auto& p : mesh_.centres) flatten(p);
   }
 
   /// Version 2 writes a cell once for each physical volume that it is in.
@@ -349,6 +379,12 @@ class Reader {
       }
     }
     mesh_.cells.resize(kept);
+    if (!centre_of_.empty()) {
+      mesh_.centres.assign(kept, Vec3::Constant(std::nan("")));
+      for (const auto& [cell, point] : centre_of_) mesh_.centres[number[cell]] = point;
+      if (std::any_of(mesh_.centres.begin(), mesh_.centres.end(), [](const Vec3& p) { return std::isnan(p[0]); }))
+        in_.fail_whole("mixes cells of first and second order. Save all of one order.");
+    }
     for (auto& [group, cells] : mesh_.solids)
       for (auto& cell : cells) cell = number[cell];
   }
@@ -411,12 +447,22 @@ class Reader {
         }
     for (auto& [group, points] : mesh_.places)
       for (auto& point : points) point = number[point];
+    std::map<FaceKey, Vec3> middles;
+    for (const auto& [key, point] : mesh_.middles) {
+      FaceKey kept_key = key;
+      for (auto& node : kept_key)
+        if (node != no_corner) node = number[node];
+      std::sort(kept_key.begin(), kept_key.end());
+      middles.emplace(kept_key, point);
+    }
+    mesh_.middles = std::move(middles);
   }
 
   Scanner in_;
   double version_ = 0;
   GmshMesh mesh_;
   std::unordered_map<std::int64_t, std::uint32_t> index_of_;
+  std::map<std::size_t, Vec3> centre_of_;  // by cell, before repeated ones are dropped
   std::array<std::unordered_map<std::int64_t, std::vector<int>>, 4>
       groups_of_;  // by dimension and entity
 };

@@ -23,6 +23,10 @@ struct GmshMesh {
   bool simplex = false;  ///< triangles or tetrahedra, otherwise quadrilaterals or hexahedra
   /// Corners of each cell in gmsh's order, with positive volume; only the first corners() count.
   std::vector<std::array<std::uint32_t, 8>> cells;
+  /// Of a mesh of second order: nodes in the middles of edges (by their two corners) and of quadrilateral faces (by four) [m], and of
+  /// cells, one each; empty where cells have none.
+  std::map<FaceKey, geometry::Vec3> middles;
+  std::vector<geometry::Vec3> centres;
   // Parts by the number of their physical group, each ascending. A part may be in several groups.
   std::map<int, std::vector<std::uint32_t>> solids;  ///< cells
   std::map<int, std::vector<FaceKey>> boundaries;    ///< faces: of dimension − 1
@@ -38,7 +42,7 @@ struct GmshMesh {
 /// @param dimension  of the structure: in 2D the cells are the mesh's triangles or quadrilaterals,
 /// which lie in z = 0
 /// @throws io::UserError located at the file when it is not such a mesh, has no cells, mixes
-/// shapes, or has elements of second order
+/// shapes, or has elements of an order above the second or without all nodes of it
 GmshMesh read_gmsh(const std::string& path, int dimension = 3);
 
 }  // namespace acopla::fem

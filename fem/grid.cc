@@ -67,6 +67,7 @@ class Builder {
   }
   std::uint32_t point(GridIndex index) {
     if (grid_.closed) index[1] %= grid_.cells[1];
+    if (grid_.joined) index = grid_.joined(index);
     const auto [found, added] =
         points_.emplace(index, static_cast<std::uint32_t>(result_.mesh.points.size()));
     if (added) {

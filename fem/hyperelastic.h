@@ -19,6 +19,31 @@ struct Hyperelastic {
   bool spatial;      ///< s_ab is p_a · p_b, otherwise ∇N_a · ∇N_b
 };
 
+/// S(C) [Pa] of the laws below, C = Fᵀ F.
+template <int d>
+Eigen::Matrix<double, d, d> stress_of(const Material& material, double lambda, const Eigen::Matrix<double, d, d>& C) {
+  using Square = Eigen::Matrix<double, d, d>;
+  const double mu = material.mu();
+  if (material.law == Material::Law::neo_hooke)
+    return mu * Square::Identity() + (0.5 * lambda * std::log(C.determinant()) - mu) * C.inverse();
+  const Square E = 0.5 * (C - Square::Identity());
+  return lambda * E.trace() * Square::Identity() + 2 * mu * E;
+}
+
+/// Strain energy W(C) [J/m³] of the undeformed body, S = 2 ∂W/∂C: ½ λ tr(E)² + μ E:E of St. Venant–Kirchhoff,
+/// ½ μ (tr C − d − ln det C) + ⅛ λ (ln det C)² of neo-Hooke.
+template <int d>
+double energy_of(const Material& material, double lambda, const Eigen::Matrix<double, d, d>& C) {
+  using Square = Eigen::Matrix<double, d, d>;
+  const double mu = material.mu();
+  const Square E = 0.5 * (C - Square::Identity());
+  if (material.law == Material::Law::neo_hooke) {
+    const double logarithm = std::log(C.determinant());
+    return 0.5 * mu * (2 * E.trace() - logarithm) + 0.125 * lambda * logarithm * logarithm;
+  }
+  return 0.5 * lambda * E.trace() * E.trace() + mu * E.squaredNorm();
+}
+
 /// St. Venant–Kirchhoff: S = λ tr(E) I + 2 μ E, E = ½ (Fᵀ F − I), which softens in compression. Compressible neo-Hooke:
 /// S = μ (I − C⁻¹) + λ ln J C⁻¹, which stiffens without bound as J → 0 (Bonet & Wood 2008, eq. 6.28 and 6.30).
 /// In the plane F is that of plane strain, or λ that of plane stress. Where J ≤ 0 neo-Hooke's stress is not a number.
@@ -32,8 +57,7 @@ Hyperelastic<d> respond(const Material& material, double lambda, const Eigen::Ma
     const double m = mu - lambda * logarithm;
     return {mu * Square::Identity() - m * C_inverse, inverse.transpose(), m * Square::Identity(), lambda, m, true};
   }
-  const Square E = 0.5 * (F.transpose() * F - Square::Identity());
-  return {lambda * E.trace() * Square::Identity() + 2 * mu * E, F, mu * F * F.transpose(), lambda, mu, false};
+  return {stress_of<d>(material, lambda, F.transpose() * F), F, mu * F * F.transpose(), lambda, mu, false};
 }
 
 }  // namespace acopla::fem

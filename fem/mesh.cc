@@ -57,7 +57,7 @@ template <class FaceIterator>
 FaceKey key_of(const FaceIterator& face) {
   FaceKey key;
   key.fill(no_corner);
-  for (unsigned v = 0; v < face->n_vertices(); ++v) key[v] = face->vertex_index(v);
+  for (unsigned v = 0; v < face->n_vertices() && v < key.size(); ++v) key[v] = face->vertex_index(v);
   std::sort(key.begin(), key.end());
   return key;
 }
@@ -154,7 +154,7 @@ Mesh::Mesh(MeshSource source, int degree)
       solids_(std::move(source.mesh.solids)),
       places_(std::move(source.mesh.places)),
       element_(source.mesh.dimension, source.mesh.simplex, degree),
-      curved_(degree == 2 && source.place) {
+      curved_(degree == 2 && (source.place || !source.mesh.middles.empty())) {
   with_dimension(dimension(), [&](auto d) {
     discretise<d>(source);
     number_nodes<d>(source);
@@ -181,6 +181,20 @@ void Mesh::discretise(const MeshSource& source) {
     space_ = std::move(result);
 }
 
+/// Nodes of second order where a mesh of that order has them.
+template <class CellIterator>
+void Mesh::place_middles(const GmshMesh& mesh, std::size_t index, const CellIterator& cell) {
+  const auto place = [&](const auto& part) {
+    const auto found = mesh.middles.find(key_of(part));
+    if (found != mesh.middles.end()) points_[part->dof_index(0)] = found->second;
+  };
+  for (unsigned l = 0; l < cell->n_lines(); ++l) place(cell->line(l));
+  if (element_.simplex) return;
+  if constexpr (CellIterator::AccessorType::dimension == 3)
+    for (const unsigned f : cell->face_indices()) place(cell->face(f));
+  if (!mesh.centres.empty()) points_[cell->dof_index(0)] = mesh.centres[index];
+}
+
 template <int d>
 void Mesh::number_nodes(const MeshSource& source) {
   const auto& [triangulation, element, mapping, handler] = discretisation<d>();
@@ -204,6 +218,7 @@ void Mesh::number_nodes(const MeshSource& source) {
         points_[nodes[a]] =
             source.place(interpolate(parameters, element_.support.col(static_cast<int>(a))));
     }
+    if (element_.degree == 2 && !source.mesh.middles.empty()) place_middles(source.mesh, index, cell);
     ++index;
   }
 }

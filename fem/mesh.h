@@ -35,7 +35,7 @@ class Mesh {
   /// @param degree  of the displacements, 1 or 2
   /// @throws io::UserError naming the source when it has inverted cells
   Mesh(MeshSource source, int degree);
-  /// Reads gmsh 2 or 4.1 ASCII. @throws io::UserError also when it cannot be read, has no cells, or
+  /// Reads gmsh 2 or 4.1 ASCII. Nodes of a mesh of second order are those of displacements of second order. @throws io::UserError also when it cannot be read, has no cells, or
   /// mixes shapes
   Mesh(const std::string& path, int degree, int dimension = 3)
       : Mesh(MeshSource::from_file(path, dimension), degree) {}
@@ -109,6 +109,8 @@ class Mesh {
   void discretise(const MeshSource& source);
   template <int d>
   void number_nodes(const MeshSource& source);
+  template <class CellIterator>
+  void place_middles(const GmshMesh& mesh, std::size_t index, const CellIterator& cell);
   template <int d>
   std::vector<BoundaryFace> boundary_faces(const std::vector<FaceKey>* keys) const;
   void measure();

@@ -76,30 +76,43 @@ std::array<bool, 3> read_directions(const io::Table& fix, int dimension) {
   return directions;
 }
 
-MotionHistory read_history(const io::Table& table, bool velocities) {
-  MotionHistory history{.amplitude = {}, .velocities = velocities};
+MotionHistory read_history(const io::Table& table, MotionHistory::Gives gives) {
+  using Gives = MotionHistory::Gives;
+  MotionHistory history{.amplitude = {}, .gives = gives};
   if (table.has("record")) {
     for (const char* other : {"ramp", "amplitude"})
       if (table.has(other)) table.fail(other, "and record are both given. Keep one of them.");
     history.amplitude = read_record(table, "record");
   } else {
+    if (gives == Gives::accelerations && !table.has("amplitude"))
+      table.fail("acceleration", "needs a record, or an amplitude over time: how long does it go on?");
     history.amplitude = read_amplitude(table);
+  }
+  if (gives == Gives::accelerations) {
+    if (table.choice("baseline", {"corrected", "raw"}, "corrected") == "corrected") history.amplitude = correct_baseline(history.amplitude);
+  } else if (table.has("baseline")) {
+    table.fail("baseline", "belongs to an acceleration.");
   }
   return history;
 }
 
 Settings::Support read_move(const io::Table& table, const Settings& settings) {
-  const bool velocities = table.has("velocity");
-  if (velocities == table.has("displacement"))
-    table.fail(velocities ? "has both a displacement and a velocity. Keep one of them."
-                          : "says no motion. Give it a displacement [m] or a velocity [m/s].");
+  using Gives = MotionHistory::Gives;
+  std::string key;
+  for (const char* motion : {"displacement", "velocity", "acceleration"}) {
+    if (!table.has(motion)) continue;
+    if (!key.empty()) table.fail(fmt::format("has both {} and {}. Keep one of them.", key, motion));
+    key = motion;
+  }
+  if (key.empty()) table.fail("says no motion. Give it a displacement [m], a velocity [m/s] or an acceleration [m/s2].");
+  const auto gives = key == "displacement" ? Gives::displacements : key == "velocity" ? Gives::velocities : Gives::accelerations;
   Settings::Support support{
       .table = table,
       .part = read_part(table, settings.mesh.groups, settings.dimension, settings.dimension - 1),
       .directions = read_directions(table, settings.dimension),
       .moves = true,
-      .value = table.vector(velocities ? "velocity" : "displacement", settings.dimension),
-      .history = read_history(table, velocities)};
+      .value = table.vector(key, settings.dimension),
+      .history = read_history(table, gives)};
   return support;
 }
 
@@ -159,8 +172,9 @@ Formulation read_formulation(const io::Table& table, int dimension) {
   if (!formulation.large) return formulation;
   if (formulation.locking == Formulation::Locking::b_bar)
     table.fail("displacements", "= \"large\" and locking = \"b_bar\" do not go together yet.");
-  if (table.text("analysis", "static") == "dynamic")
-    table.fail("displacements", "= \"large\" is there for analysis = \"static\" alone.");
+  for (const char* key : {"newmark", "generalised_alpha"})
+    if (table.has(key))
+      table.fail(key, "belongs to displacements = \"small\": large ones move by the midpoint rule that keeps energy and momentum. Leave it out.");
   return formulation;
 }
 
@@ -201,6 +215,24 @@ std::optional<Settings::Motion> read_motion(const io::Table& table) {
   return motion;
 }
 
+/// In 2D about z.
+std::vector<Settings::Torque> read_torques(const io::Table& output, const Settings& settings) {
+  std::vector<Settings::Torque> torques;
+  if (!output.has("torque")) return torques;
+  if (!settings.foundations.empty())
+    output.fail("torque", "is there without foundations: theirs is not known point by point. Leave one of them out.");
+  for (const auto& [name, table] : output.table("torque").named_tables()) {
+    Settings::Torque torque{name, table.has("about") ? table.vector("about", settings.dimension) : Vec3(Vec3::Zero()), Vec3::UnitZ()};
+    if (settings.dimension == 3) {
+      torque.axis = table.vector("axis", 3);
+      if (!(torque.axis.norm() > 0)) table.fail("axis", "has no length. Give a direction, e.g. [0, 0, 1].");
+      torque.axis.normalize();
+    }
+    torques.push_back(torque);
+  }
+  return torques;
+}
+
 std::vector<Settings::Probe> read_probes(const io::Table& output, int dimension) {
   std::vector<Settings::Probe> probes;
   if (!output.has("point")) return probes;
@@ -237,10 +269,12 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   settings.solver = read_solver(table);
   const auto output = table.table_or_empty("output");
   settings.vtu = output.flag("vtu", true);
+  settings.hdf5 = output.flag("hdf5", false);
   settings.every = output.optional_number("every", io::positive);
   settings.von_mises = output.flag("von_mises", !settings.motion);
   settings.energy = output.flag("energy", false);
   settings.probes = read_probes(output, settings.dimension);
+  settings.torques = read_torques(output, settings);
   settings.reactions = output.flag("reactions", false);
   settings.frequencies = static_cast<std::size_t>(output.integer("frequencies", 1, 1000, 0));
   if (settings.frequencies > 0)

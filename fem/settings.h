@@ -28,7 +28,7 @@ struct Settings {
     Part part;
     std::array<bool, 3> directions;
     bool moves = false;
-    Vec3 value = Vec3::Zero();  ///< displacement [m], or velocity [m/s], at amplitude 1
+    Vec3 value = Vec3::Zero();  ///< displacement [m], velocity [m/s] or acceleration [m/s²] at amplitude 1
     MotionHistory history;
   };
   /// A material and the group of cells that it fills; no group: all cells.
@@ -43,6 +43,12 @@ struct Settings {
     std::string name;
     Vec3 at;  ///< [m]; the nearest node is taken
     bool stress = false;
+  };
+  /// An axis about which the torque of the supports and of the loads is reported of every window.
+  struct Torque {
+    std::string name;
+    Vec3 about = Vec3::Zero();  ///< a point of the axis [m]
+    Vec3 axis = Vec3::UnitZ();  ///< of length 1
   };
   /// Of a dynamic analysis.
   struct Motion {
@@ -66,9 +72,11 @@ struct Settings {
   std::optional<Motion> motion;  ///< empty: static
   SolverOptions solver;
   bool vtu = true;
+  bool hdf5 = false;            ///< write the nodal fields of every picture into one file as well
   std::optional<double> every;  ///< time between pictures [s]; empty: the last window only
   bool von_mises = true;        ///< report the largest von Mises stress of every window
   std::vector<Probe> probes;
+  std::vector<Torque> torques;
   bool reactions = false;       ///< report the reaction of each support
   std::size_t frequencies = 0;  ///< lowest natural frequencies to report at the end
   bool energy = false;          ///< report the energy balance of a structure in motion

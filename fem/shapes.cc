@@ -173,11 +173,64 @@ Grid read_annulus(const io::Table& table, int dimension) {
   return grid;
 }
 
+/// Half the side of the square in the middle of a disc, over its radius.
+constexpr double core = 0.45;
+
+/// Coordinates: those of a square of n × n cells with m rows on each side, whose corners are left out; the rows beside a left-out corner are
+/// joined, and become a ring between the square and the circle.
+Grid read_disc(const io::Table& table, int dimension) {
+  const double radius = table.number("radius", io::positive), height = dimension == 3 ? table.number("height", io::positive) : 0;
+  const auto counts = dimension == 3 ? table.numbers("cells") : std::vector<double>{table.number("cells"), 1};
+  if (counts.size() != 2) table.fail("cells", "needs two whole numbers: around a quarter, and along the axis.");
+  for (const double count : counts)
+    if (count != std::floor(count) || count < 1 || count > 1e6)
+      table.fail("cells", fmt::format("has {:.6g}; a number of cells is a whole number of at least 1.", count));
+  const Vec3 centre = table.has("centre") ? table.vector("centre", dimension) : Vec3::Zero();
+  const int n = static_cast<int>(counts[0]), m = (n + 1) / 2, end = m + n;
+  Grid grid{.dimension = dimension, .cells = {n + 2 * m, n + 2 * m, static_cast<int>(counts[1])}};
+  const auto beside = [=](int i) { return i < m || i >= end; };
+  grid.keep = [=](const GridIndex& cell) { return !beside(cell[0]) || !beside(cell[1]); };
+  grid.joined = [=](const GridIndex& index) -> GridIndex {
+    const auto [i, j, k] = index;
+    const int off = i < m ? m - i : i > end ? i - end : 0;  // from the square, along x
+    if (off == 0 || (j != m && j != end)) return index;
+    return {i < m ? m : end, j == m ? m - off : end + off, k};
+  };
+  grid.corner = [=](const GridIndex& index) { return Vec3(index[0], index[1], index[2]); };
+  grid.place = [=, layers = counts[1]](const Vec3& p) {
+    const Vec3 inner(2 * core * radius * ((p[0] - m) / n - 0.5), 2 * core * radius * ((p[1] - m) / n - 0.5), 0);
+    const double height_here = height * p[2] / layers;
+    for (const int d : {0, 1}) {
+      const double off = p[d] < m ? m - p[d] : p[d] > end ? p[d] - end : 0;
+      if (off == 0) continue;
+      const double side = p[d] < m ? -1 : 1, across = inner[1 - d] / (core * radius), share = off / m, angle = 45 * degree * across;
+      Vec3 from, to;  // on the square, on the circle
+      from[d] = side * core * radius;
+      from[1 - d] = across * core * radius;
+      to[d] = side * radius * std::cos(angle);
+      to[1 - d] = radius * std::sin(angle);
+      from[2] = to[2] = height_here;
+      return Vec3(centre + (1 - share) * from + share * to);
+    }
+    return Vec3(centre + Vec3(inner[0], inner[1], height_here));
+  };
+  grid.sides = [=, cells = grid.cells](int side, const GridIndex& cell) -> std::vector<std::string> {
+    if (side >= 4) return {side == 4 ? "z0" : "z1"};
+    const auto d = static_cast<std::size_t>(side / 2);
+    if (cell[d] == (side % 2 ? cells[d] - 1 : 0)) return {"outside"};
+    return {};
+  };
+  return grid;
+}
+
 Grid read_shape(const io::Table& table, const std::string& shape, int dimension) {
   if (shape == "bar") return read_bar(table, dimension);
   if (shape == "plate") return read_plate(table, dimension);
   if (shape == "box") return read_box(table, dimension);
   if (shape == "l_bracket") return read_bracket(table, dimension);
+  if (shape == "disc" && dimension == 3) table.fail("is a shape in 2D; in 3D use a rod.");
+  if (shape == "rod" && dimension == 2) table.fail("is a shape in 3D; in 2D use a disc.");
+  if (shape == "disc" || shape == "rod") return read_disc(table, dimension);
   if (shape == "annulus" && dimension == 3) table.fail("is a shape in 2D; in 3D use a cylinder.");
   if (shape == "cylinder" && dimension == 2) table.fail("is a shape in 3D; in 2D use an annulus.");
   return read_annulus(table, dimension);
@@ -193,7 +246,7 @@ MeshChoice read_mesh_choice(const io::Table& structure, int dimension) {
   }
   const auto table = structure.table("mesh");
   std::string found;
-  const std::vector<std::string> shapes{"bar", "plate", "box", "l_bracket", "annulus", "cylinder"};
+  const std::vector<std::string> shapes{"bar", "plate", "box", "l_bracket", "annulus", "cylinder", "disc", "rod"};
   for (const auto& shape : shapes) {
     if (!table.has(shape)) continue;
     if (!found.empty())

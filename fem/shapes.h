@@ -23,6 +23,7 @@ struct MeshChoice {
 ///   (the legs' ends), outer, inner, front, back annulus   inner, outer, cells (radial, around),
 ///   [centre, from, to]: inside, outside; of a sector start, end cylinder  as annulus with height
 ///   and cells along it, hollow: also z0, z1
+///   disc      radius, cells around a quarter, [centre]: outside    rod  as disc with height, cells = [around a quarter, along]: also z0, z1
 /// @throws io::UserError
 MeshChoice read_mesh_choice(const io::Table& structure, int dimension);
 

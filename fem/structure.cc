@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "fem/cholesky.h"
 #include "fem/finite_strain.h"
 #include "fem/interface.h"
+#include "fem/large_motion.h"
 #include "fem/model.h"
 #include "fem/modes.h"
 #include "fem/picture.h"
@@ -38,28 +40,34 @@ struct Structure::Body {
   BlockMatrix stiffness;
   Stress stress;
   std::optional<Statics> statics;
-  std::optional<LargeDisplacements> large;  // of a static structure instead
-  std::optional<MassMatrix> mass;           // of a structure in motion, as the next
+  std::optional<LargeDisplacements> large;  // instead, and to start a motion from
+  std::optional<MassMatrix> mass;           // of a structure in motion, as one of the next
   std::optional<Dynamics> dynamics;
+  std::optional<LargeMotion> large_motion;
 
   Body(const Settings& settings, const Vec3& gravity)
       : model(settings, gravity),
         stiffness(stiffness_of(settings, model)),
         stress(model.mesh, model.materials, settings.formulation) {
-    if (settings.formulation.large) {
+    const bool is_large = settings.formulation.large;
+    if (is_large && (!settings.motion || settings.motion->from_equilibrium))
       large.emplace(model.mesh, model.materials, model.supports.fixed(), settings.solver,
                     settings.formulation);
-      return;
-    }
     if (!settings.motion) {
-      statics.emplace(model.mesh, stiffness, model.supports.fixed(), settings.solver);
+      if (!is_large) statics.emplace(model.mesh, stiffness, model.supports.fixed(), settings.solver);
       return;
     }
     mass.emplace(
         assemble_mass(model.mesh, model.materials, settings.formulation, stiffness.pattern()));
-    dynamics.emplace(model.mesh, stiffness, *mass, settings.motion->damping, model.supports,
-                     model.loads, settings.motion->scheme, settings.solver);
+    if (is_large)
+      large_motion.emplace(model.mesh, model.materials, *mass, settings.motion->damping, model.supports,
+                           model.loads, settings.solver, settings.formulation);
+    else
+      dynamics.emplace(model.mesh, stiffness, *mass, settings.motion->damping, model.supports,
+                       model.loads, settings.motion->scheme, settings.solver);
   }
+  bool moves() const { return mass.has_value(); }
+  Energy energy(const Motion& motion) const { return dynamics ? dynamics->energy(motion) : large_motion->energy(motion); }
 };
 
 /// A surface that the coupling uses.
@@ -106,6 +114,17 @@ int steps_in(double length, const std::optional<double>& longest) {
 
 }  // namespace
 
+namespace {
+
+/// A mesh drawn in millimetres is a thousand times too large.
+std::string doubtful_size(const Mesh& mesh) {
+  if (mesh.extent() < 1000) return {};
+  return fmt::format("the mesh is {:.4g} m large. Lengths are metres: was it drawn in millimetres?",
+                     mesh.extent());
+}
+
+}  // namespace
+
 std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   const Stopwatch setup;
   run_ = run;
@@ -115,6 +134,8 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
                          "must be 1 in a coupling: forces between participants in 2D are those of "
                          "a metre of depth.");
   body_ = std::make_unique<Body>(settings_, Vec3(run.gravity[0], run.gravity[1], run.gravity[2]));
+  if (const auto doubt = doubtful_size(body_->model.mesh); !doubt.empty())
+    fmt::print(stderr, "{}: warning: {}.mesh: {}\n", settings_.table.location("mesh").text(), settings_.name, doubt);
   std::vector<protocol::Surface> surfaces;
   for (const auto& use : run.uses) {
     coupled_.push_back({use, make_interface(settings_, body_->model.mesh, use.surface)});
@@ -126,7 +147,7 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   find_probes();
   if (body_->statics)
     body_->statics->prepare();
-  else if (body_->dynamics)
+  else if (body_->moves())
     begin_motion();
   seconds_.factor = factor.seconds();
   // What explicit schemes must know; nobody asks where nothing is sent back.
@@ -215,6 +236,23 @@ void Structure::add_reactions(const Vector& reaction,
   }
 }
 
+/// axis · Σ (x − about) × F; where displacements are large, of the places at the window's end.
+void Structure::add_torques(const Response& response, std::vector<std::pair<std::string, double>>& result) const {
+  const auto& mesh = body_->model.mesh;
+  for (const auto& [name, about, axis] : settings_.torques) {
+    double reaction = 0, load = 0;
+    for (std::size_t n = 0; n < mesh.nodes(); ++n) {
+      Vec3 arm = mesh.points()[n] - about;
+      if (settings_.formulation.large) arm += value_at(state_.motion.displacement, n, mesh.dimension());
+      const Vec3 turn = axis.cross(arm);  // axis · (arm × F) = (axis × arm) · F
+      reaction += turn.dot(value_at(response.reaction, n, mesh.dimension()));
+      load += turn.dot(value_at(response.load, n, mesh.dimension()));
+    }
+    result.emplace_back(name + ".torque.reaction", reaction);
+    result.emplace_back(name + ".torque.load", load);
+  }
+}
+
 /// Before hours of a run that they would end in.
 void Structure::check_frequencies() const {
   const auto output = settings_.table.table("output");
@@ -237,6 +275,7 @@ void Structure::check_frequencies() const {
 void Structure::begin_motion() {
   const auto& [mesh, materials, supports, loads] = body_->model;
   const auto prepare = [&] {
+    if (!body_->dynamics) return;  // large displacements factor in every step
     const double window = run_.time(run_.window);
     body_->dynamics->prepare(window / steps_in(window, settings_.motion->step));
   };
@@ -251,13 +290,18 @@ void Structure::begin_motion() {
     require_supported(
         settings_, mesh, supports.fixed(), "start",
         "There is no equilibrium under its weight and loads: use start = \"rest\", or fix more.");
-    Statics statics(mesh, body_->stiffness, supports.fixed(), settings_.solver);
-    statics.prepare();
-    motion.displacement = statics.solve(load, {}, motion.displacement).displacement;
+    if (body_->large) {
+      motion.displacement = body_->large->solve(load, motion.displacement).displacement;
+      body_->large.reset();  // a motion does without
+    } else {
+      Statics statics(mesh, body_->stiffness, supports.fixed(), settings_.solver);
+      statics.prepare();
+      motion.displacement = statics.solve(load, {}, motion.displacement).displacement;
+    }
   }
   prepare();  // once the factor of the statics is gone
   if (settings_.energy) {
-    state_.passed = body_->dynamics->energy(motion);
+    state_.passed = body_->energy(motion);
     start_energy_ = state_.passed.kinetic + state_.passed.strain;
   }
 }
@@ -313,13 +357,13 @@ Structure::Response Structure::equilibrate(const protocol::Window& window, const
     worst_residual_ = std::max(worst_residual_, solution.residual);
     motion.displacement = std::move(solution.displacement);
     motion.force = load;
-    return {std::move(solution.reaction), total(load, mesh.dimension()),
+    return {std::move(solution.reaction), load,
             body_->large->iterations() - before};
   }
   auto solution = body_->statics->solve(load, state_.motion.displacement, prescribed);
   worst_residual_ = std::max(worst_residual_, solution.residual);
   state_.motion.displacement = std::move(solution.displacement);
-  return {std::move(solution.reaction), total(load, mesh.dimension()), 1};
+  return {std::move(solution.reaction), load, 1};
 }
 
 Structure::Response Structure::move(const protocol::Window& window, const Vector& force) {
@@ -328,10 +372,11 @@ Structure::Response Structure::move(const protocol::Window& window, const Vector
   auto& passed = state_.passed;
   state_.motion.time = window.start_time;
   Energy energy;
+  auto* wanted = settings_.energy ? &energy : nullptr;
   Response response{
-      body_->dynamics->advance(state_.motion, force, window.length, steps,
-                               settings_.energy ? &energy : nullptr),
-      total(force + loads.mean(window.start_time, window.end_time()), mesh.dimension()),
+      body_->dynamics ? body_->dynamics->advance(state_.motion, force, window.length, steps, wanted)
+                      : body_->large_motion->advance(state_.motion, force, window.length, steps, wanted),
+      force + loads.mean(window.start_time, window.end_time()),
       static_cast<std::uint64_t>(steps)};
   passed = {energy.kinetic, energy.strain, passed.work + energy.work,
             passed.support_work + energy.support_work, passed.damping + energy.damping};
@@ -343,7 +388,7 @@ protocol::Advance Structure::advance(const protocol::Window& window,
   if (state_.due) draw();
   const auto force = received_load(received);
   const Stopwatch solve;
-  const auto response = body_->dynamics ? move(window, force) : equilibrate(window, force);
+  const auto response = body_->moves() ? move(window, force) : equilibrate(window, force);
   state_.motion.time = window.end_time();
   state_.due = is_due(window);
   state_.drawn = false;
@@ -356,18 +401,20 @@ std::vector<std::pair<std::string, double>> Structure::quantities(const Response
   const int dimension = settings_.dimension;
   std::vector<std::pair<std::string, double>> result;
   Vec3 reaction = total(response.reaction, dimension);
+  const Vec3 load = total(response.load, dimension);
   for (const auto& foundation : settings_.foundations)
     reaction += force(foundation, body_->model.mesh, settings_.formulation, state_.motion.displacement);
   for (int d = 0; d < dimension; ++d)
     result.emplace_back(std::string("reaction.") + "xyz"[d], reaction[d]);
   for (int d = 0; d < dimension; ++d)
-    result.emplace_back(std::string("load.") + "xyz"[d], response.load[d]);
+    result.emplace_back(std::string("load.") + "xyz"[d], load[d]);
   result.emplace_back("displacement.max", largest_length(state_.motion.displacement, dimension));
   if (settings_.motion)
     result.emplace_back("velocity.max", largest_length(state_.motion.velocity, dimension));
   if (settings_.von_mises)
     result.emplace_back("von_mises.max", body_->stress.peak(state_.motion.displacement).value);
   add_reactions(response.reaction, result);
+  add_torques(response, result);
   add_probes(result);
   if (settings_.energy) {
     const auto& [kinetic, strain, work, support_work, damping] = state_.passed;
@@ -393,15 +440,43 @@ bool Structure::is_due(const protocol::Window& window) const {
 void Structure::draw() {
   state_.due = false;
   state_.drawn = true;
-  if (!settings_.vtu || run_.results.empty()) return;
+  if (run_.results.empty() || !(settings_.vtu || settings_.hdf5)) return;
   const auto folder = std::filesystem::path(run_.results);
   std::filesystem::create_directories(folder);
-  const auto file = fmt::format("{}_{:04d}.vtu", settings_.name, ++pictures_);
+  ++pictures_;
+  if (settings_.hdf5) write_nodal((folder / (settings_.name + ".h5")).string());
+  if (!settings_.vtu) return;
+  const auto file = fmt::format("{}_{:04d}.vtu", settings_.name, pictures_);
   const auto& displacement = state_.motion.displacement;
   write_picture((folder / file).string(), body_->model.mesh, displacement,
                 body_->stress.nodal_von_mises(displacement));
   if (!series_) series_.emplace((folder / (settings_.name + ".pvd")).string());
   series_->add(state_.motion.time, (folder / file).string());
+}
+
+/// All nodes as points of the surface "mesh", whose faces are those of the boundary; one row a picture.
+void Structure::write_nodal(const std::string& path) {
+  const auto& mesh = body_->model.mesh;
+  const int dimension = mesh.dimension();
+  if (!nodal_) {
+    geometry::SurfaceMesh nodes;
+    nodes.points = mesh.points();
+    for (const auto& face : mesh.boundary()) nodes.add_face(face.kind, face.used());
+    nodal_ = std::make_unique<io::SeriesWriter>(path);
+    nodal_->add_surface("mesh", nodes);
+  }
+  nodal_->begin_window(state_.motion.time, state_.motion.time);
+  std::vector<Vec3> values(mesh.nodes());
+  const auto add = [&](const std::string& name, const Vector& nodal) {
+    for (std::size_t n = 0; n < values.size(); ++n) values[n] = value_at(nodal, n, dimension);
+    nodal_->add_field("mesh", name, values);
+  };
+  add("displacement", state_.motion.displacement);
+  if (settings_.motion) add("velocity", state_.motion.velocity);
+  const auto stress = body_->stress.nodal(state_.motion.displacement);
+  for (std::size_t n = 0; n < values.size(); ++n) values[n] = principal(stress.col(static_cast<Eigen::Index>(n)));
+  nodal_->add_field("mesh", "principal_stress", values);
+  nodal_->flush();
 }
 
 // A picture of a window is drawn when the next begins, so that a rejected iteration leaves none.
@@ -446,13 +521,17 @@ void Structure::resume(const std::string& folder) {
   reader.finish();
   state_.due = false;
   saved_ = state_;
-  if (!settings_.vtu || run_.results.empty() || pictures_ == 0) return;
-  series_.emplace((std::filesystem::path(run_.results) / (settings_.name + ".pvd")).string());
+  if (run_.results.empty() || pictures_ == 0) return;
+  const auto results = std::filesystem::path(run_.results) / settings_.name;
+  if (settings_.hdf5) nodal_ = std::make_unique<io::SeriesWriter>(results.string() + ".h5", static_cast<std::size_t>(pictures_));
+  if (!settings_.vtu) return;
+  series_.emplace(results.string() + ".pvd");
   series_->keep_until(state_.motion.time);
 }
 
 std::vector<std::pair<std::string, double>> Structure::finish() {
   if (!state_.drawn) draw();
+  nodal_.reset();
   std::vector<std::pair<std::string, double>> result{
       {"seconds.setup", seconds_.setup},
       {"seconds.factor", seconds_.factor},
@@ -462,6 +541,8 @@ std::vector<std::pair<std::string, double>> Structure::finish() {
   if (body_->dynamics) result.emplace_back("factor.bytes", body_->dynamics->solver().factor_bytes);
   if (body_->dynamics)
     result.emplace_back("factorisations", static_cast<double>(body_->dynamics->factorisations()));
+  else if (body_->large_motion)
+    result.emplace_back("factorisations", static_cast<double>(body_->large_motion->factorisations()));
   else
     result.emplace_back("residual", worst_residual_);
   for (auto& frequency : frequencies()) result.push_back(std::move(frequency));
@@ -517,13 +598,6 @@ std::string scheme_of(const Settings::Motion& motion) {
              : fmt::format("Newmark, β = {:.4g}, γ = {:.4g}", scheme.beta, scheme.gamma);
 }
 
-/// A mesh drawn in millimetres is a thousand times too large.
-std::string doubtful_size(const Mesh& mesh) {
-  if (mesh.extent() < 1000) return {};
-  return fmt::format("the mesh is {:.4g} m large. Lengths are metres: was it drawn in millimetres?",
-                     mesh.extent());
-}
-
 double mass_of(const Settings& settings, const Model& model) {
   double mass = 0;
   const Vector unit =
@@ -552,7 +626,9 @@ std::string explain(const Settings& settings) {
       mesh.dimension() == 2 ? "area" : "volume", mesh.volume(), mesh.dimension() == 2 ? "m2" : "m3",
       mass > 0 ? fmt::format("mass {:.6g} kg", mass) : "no density, so no weight");
   if (const auto doubt = doubtful_size(mesh); !doubt.empty()) text += "  warning: " + doubt + "\n";
-  if (settings.motion) text += fmt::format("  time integration: {}\n", scheme_of(*settings.motion));
+  if (settings.motion)
+    text += fmt::format("  time integration: {}\n", settings.formulation.large ? "energy and momentum kept, midpoint rule with Newton's method"
+                                                                            : scheme_of(*settings.motion));
   text += fmt::format("  linear solver: {}, because {}\n",
                       solver.direct ? settings.formulation.large
                                           ? "direct (Cholesky, factored every iteration)"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fem/settings.h"
+#include "io/series.h"
 #include "io/vtk.h"
 #include "protocol/participant.h"
 
@@ -39,8 +40,7 @@ class Structure : public protocol::Participant {
   struct Coupled;
   /// What a window gave, beside the motion.
   struct Response {
-    Vector reaction;
-    Vec3 load = Vec3::Zero();
+    Vector reaction, load;  ///< of every node [N]
     std::uint64_t steps = 1;
   };
   Vector received_load(const std::vector<protocol::Field>& received) const;
@@ -55,10 +55,12 @@ class Structure : public protocol::Participant {
   void add_probes(std::vector<std::pair<std::string, double>>& result) const;
   void add_reactions(const Vector& reaction,
                      std::vector<std::pair<std::string, double>>& result) const;
+  void add_torques(const Response& response, std::vector<std::pair<std::string, double>>& result) const;
   std::vector<std::pair<std::string, double>> quantities(const Response& response) const;
   std::vector<protocol::Field> fields() const;
   bool is_due(const protocol::Window& window) const;
   void draw();
+  void write_nodal(const std::string& path);
 
   /// What a rejected iteration must undo.
   struct State {
@@ -90,6 +92,7 @@ class Structure : public protocol::Participant {
   double worst_residual_ = 0;
   int pictures_ = 0;
   std::optional<io::PvdSeries> series_;
+  std::unique_ptr<io::SeriesWriter> nodal_;  // when asked for, from the first picture on
 };
 
 /// Plain lines on what a run will do: cells, unknowns, solver, memory, expected time. Reads the

@@ -138,8 +138,7 @@ void Supports::claim(const Mesh& mesh, std::uint32_t node, int direction) {
     const bool same =
         (stays(now) && stays(before)) ||
         (now.moves && before.moves && now.value[direction] == before.value[direction] &&
-         now.history.velocities == before.history.velocities &&
-         now.history.amplitude.points() == before.history.amplitude.points());
+         now.history == before.history);
     if (same) return;
     const auto& p = mesh.points()[node];
     throw std::invalid_argument(

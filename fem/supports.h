@@ -29,7 +29,7 @@ class Supports {
   /// @throws std::invalid_argument, whose text continues that name, when another support moves them
   void hold(const std::string& name, const Mesh& mesh, const std::vector<std::uint32_t>& nodes,
             const std::array<bool, 3>& directions);
-  /// Moves nodes by value · history. @param value  [m], or [m/s] for a history of velocities
+  /// Moves nodes by value · history. @param value  [m], or [m/s], [m/s²] for a history of velocities or accelerations
   /// @throws std::invalid_argument as hold
   void move(const std::string& name, const Mesh& mesh, const std::vector<std::uint32_t>& nodes,
             const std::array<bool, 3>& directions, const Vec3& value, const MotionHistory& history);

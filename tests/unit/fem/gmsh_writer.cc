@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <vector>
 
 namespace acopla::fem::test {
@@ -20,6 +21,7 @@ class Writer {
  public:
   explicit Writer(const Block& block) : block_(block) {
     const auto [nx, ny, nz] = block.cells;
+    for (auto& count : block_.cells) count *= block.order;
     for (int k = 0; k < nz; ++k)
       for (int j = 0; j < ny; ++j)
         for (int i = 0; i < nx; ++i) add_hexahedron(i, j, k);
@@ -43,7 +45,7 @@ class Writer {
   void add_hexahedron(int i, int j, int k) {
     std::array<int, 8> n;
     for (int c = 0; c < 8; ++c)
-      n[static_cast<std::size_t>(c)] = node(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+      n[static_cast<std::size_t>(c)] = node(block_.order * (i + (c & 1)), block_.order * (j + (c >> 1 & 1)), block_.order * (k + (c >> 2)));
     if (block_.tetrahedra) {  // Kuhn: the paths along the edges from corner 0 to corner 7
       for (const auto& path : {std::array{1, 3}, {3, 2}, {2, 6}, {6, 4}, {4, 5}, {5, 1}})
         add_cell({n[0], n[static_cast<std::size_t>(path[0])], n[static_cast<std::size_t>(path[1])],
@@ -56,14 +58,36 @@ class Writer {
   }
 
   void add_cell(const Nodes& cell, const std::vector<Nodes>& faces) {
-    cells_.push_back(cell);
+    cells_.push_back(with_middles(cell));
     for (const auto& face : faces) {
       Nodes nodes;
       for (const int corner : face) nodes.push_back(cell[static_cast<std::size_t>(corner)]);
       for (std::size_t s = 0; s < 6; ++s)
         if (std::all_of(nodes.begin(), nodes.end(), [&](int n) { return lies_on(n, s); }))
-          faces_[s].push_back(nodes);
+          faces_[s].push_back(with_middles(nodes));
     }
+  }
+
+  /// Adds the nodes of second order, in gmsh's order.
+  Nodes with_middles(Nodes corners) const {
+    if (block_.order == 1) return corners;
+    static const std::map<std::pair<std::size_t, bool>, std::vector<Nodes>> middles{
+        {{2, false}, {{0, 1}}},
+        {{3, true}, {{0, 1}, {1, 2}, {2, 0}}},
+        {{4, false}, {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 1, 2, 3}}},
+        {{4, true}, {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}}},
+        {{8, false}, {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3}, {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7},
+                      {0, 1, 2, 3}, {0, 1, 5, 4}, {0, 3, 7, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {4, 5, 6, 7}, {0, 1, 2, 3, 4, 5, 6, 7}}}};
+    const auto count = corners.size();
+    Nodes result = corners;
+    for (const auto& middle : middles.at({count, count > 2 && block_.tetrahedra})) {
+      std::array<int, 3> sum{};
+      for (const int corner : middle)
+        for (std::size_t d = 0; d < 3; ++d) sum[d] += indices(corners[static_cast<std::size_t>(corner)])[d];
+      const int size = static_cast<int>(middle.size());
+      result.push_back(node(sum[0] / size, sum[1] / size, sum[2] / size));
+    }
+    return result;
   }
 
   std::array<int, 3> indices(int n) const {
@@ -87,7 +111,7 @@ class Writer {
   std::vector<Nodes> ridge() const {
     const auto [nx, ny, nz] = block_.cells;
     std::vector<Nodes> lines;
-    for (int j = 0; j < ny; ++j) lines.push_back({node(nx, j, nz), node(nx, j + 1, nz)});
+    for (int j = 0; j < ny; j += block_.order) lines.push_back(with_middles({node(nx, j, nz), node(nx, j + block_.order, nz)}));
     return lines;
   }
   /// Cells of "solid", or of "other".
@@ -102,8 +126,9 @@ class Writer {
       if ((block_.two_solids && half(cell)) == other) result.push_back(cell);
     return result;
   }
-  int cell_type() const { return block_.tetrahedra ? 4 : 5; }
-  int face_type() const { return block_.tetrahedra ? 2 : 3; }
+  int of_order(int type) const { return block_.order == 1 ? type : type + 7; }  // 8 to 12
+  int cell_type() const { return of_order(block_.tetrahedra ? 4 : 5); }
+  int face_type() const { return of_order(block_.tetrahedra ? 2 : 3); }
   std::size_t element_count() const {
     std::size_t count = cells_.size() + ridge().size() + 1;
     for (const auto& faces : faces_) count += faces.size();
@@ -121,7 +146,7 @@ class Writer {
     for (int s = 0; s < 6; ++s)
       for (const auto& face : faces_[static_cast<std::size_t>(s)]) add(face_type(), s + 1, face);
     add(15, 10, {node_count()});
-    for (const auto& line : ridge()) add(1, 9, line);
+    for (const auto& line : ridge()) add(of_order(1), 9, line);
     for (const auto& cell : cells_of(false)) add(cell_type(), 7, cell);
     for (const auto& cell : cells_of(true)) add(cell_type(), 11, cell);
     return text + "$EndElements\n";
@@ -143,13 +168,13 @@ class Writer {
     };
     for (int s = 0; s < 6; ++s) add(2, s + 1, face_type(), faces_[static_cast<std::size_t>(s)]);
     add(0, 1, 15, {{node_count()}});
-    add(1, 1, 1, ridge());
+    add(1, 1, of_order(1), ridge());
     add(3, 1, cell_type(), cells_of(false));
     add(3, 2, cell_type(), cells_of(true));
     return text + "$EndElements\n";
   }
 
-  const Block& block_;
+  Block block_;  // cells counted in steps of nodes
   std::vector<Nodes> cells_;
   std::array<std::vector<Nodes>, 6> faces_;
 };

@@ -16,6 +16,7 @@ struct Block {
   std::array<int, 3> cells{2, 2, 2};  ///< along x, y, z
   bool tetrahedra = false;            ///< six a hexahedron
   double version = 4.1;               ///< of the format, 2.2 or 4.1
+  int order = 1;                      ///< of the elements: 2 has nodes in the middles, in gmsh's order
   bool two_solids = false;  ///< the cells of the upper half along x are "other" instead of "solid"
   /// Moves the nodes; identity unless given.
   std::function<Vec3(const Vec3&)> move = [](const Vec3& p) { return p; };

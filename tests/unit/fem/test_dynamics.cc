@@ -355,7 +355,7 @@ TEST_F(AnOscillator, IsShakenByItsBase) {
     body.supports.hold("sides", mesh_, all, {false, true, true});
     body.supports.move(
         "base", mesh_, nodes_of(mesh_.boundary("x0")), {true, false, false}, Vec3(1, 0, 0),
-        {.amplitude = Amplitude({{0, 0}, {100 * period, 100 * period * b}}), .velocities = true});
+        {.amplitude = Amplitude({{0, 0}, {100 * period, 100 * period * b}}), .gives = MotionHistory::Gives::velocities});
     auto dynamics = body.dynamics(scheme);
     auto motion = body.rest();
     const Vector none = mesh_.zero();

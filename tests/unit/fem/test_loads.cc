@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include <Eigen/Geometry>
 
 #include "cells.h"
@@ -224,6 +226,14 @@ TEST_F(BadInput, OfSupportsIsLocatedAndSaysWhatToDo) {
          {"structure.move.x1 contradicts structure.fix.z0: both prescribe the displacement along x "
           "at (1, ",
           "Leave that direction out"});
+  // the same motion at another time is one, the same twice is none
+  const std::string up = "[structure.move.z0]\ndisplacement = [0, 0, 1e-3]\nramp = 1\n";
+  expect(up + "[structure.move.y0]\ndisplacement = [0, 0, 1e-3]\nramp = 2\n",
+         {"structure.move.y0 contradicts structure.move.z0: both prescribe the displacement along z", "choose parts that share no node"});
+  expect(up + "[structure.move.y0]\ndisplacement = [0, 0, 1e-3]\nramp = 1\n", {"no error"});
+  const auto back = write_file("back.csv", "0 0\n2 1\n1 0\n");
+  expect("[structure.move.z0]\nvelocity = [1, 0, 0]\nrecord = \"" + back + "\"\n",
+         {"case.toml:10:", "structure.move.z0.record goes from t = 2 s to t = 1 s. Times must ascend"});
   // what both leave at zero is no contradiction
   expect(
       "[structure.fix.y0]\ndirections = [\"y\"]\n[structure.move.z0]\ndisplacement = [1e-3, 0, "
@@ -307,6 +317,37 @@ TEST(ARecord, OfVelocitiesIsIntegrated) {
               std::string::npos)
         << error.what();
   }
+}
+
+// Accelerations are integrated twice, exactly for what is linear between points: a(t) = 6 t gives v = 3 t², u = t³; after the record the
+// velocity stays. Less its baseline, a record ends at rest where it began, and what is a straight line is gone.
+TEST(ARecord, OfAccelerationsIsIntegratedTwice) {
+  const MotionHistory raw{Amplitude({{0, 0}, {0.5, 3}, {2, 12}}), MotionHistory::Gives::accelerations};
+  for (const double t : {0.25, 0.5, 1.0, 2.0}) {
+    EXPECT_NEAR(raw.displacement(t), t * t * t, 1e-14 * 8);
+    EXPECT_NEAR(raw.velocity(t), 3 * t * t, 1e-14 * 12);
+    EXPECT_NEAR(raw.acceleration(t), 6 * t, 1e-14 * 12);
+  }
+  EXPECT_NEAR(raw.displacement(3), 8 + 12, 1e-13);
+  EXPECT_NEAR(raw.velocity(3), 12, 1e-13);
+  EXPECT_EQ(raw.acceleration(3), 0);
+  EXPECT_EQ(raw.displacement(-1), 0);
+  const auto nothing = correct_baseline(raw.amplitude);
+  for (const auto& [t, a] : nothing.points()) EXPECT_NEAR(a, 0, 1e-13) << t;
+  std::vector<std::pair<double, double>> shaken;
+  for (int n = 0; n <= 400; ++n) shaken.emplace_back(1 + 0.01 * n, std::sin(7.0 * n * 0.01) + 0.02 + 0.01 * n * 0.01);
+  const MotionHistory corrected{correct_baseline(Amplitude(shaken)), MotionHistory::Gives::accelerations};
+  EXPECT_NEAR(corrected.velocity(5), 0, 1e-14);
+  EXPECT_NEAR(corrected.displacement(5), 0, 1e-14);
+  EXPECT_NEAR(corrected.displacement(9), 0, 1e-13);
+  EXPECT_GT(std::abs(MotionHistory{Amplitude(shaken), MotionHistory::Gives::accelerations}.displacement(5)), 0.2);
+}
+
+TEST_F(BadInput, OfAccelerationsIsLocatedAndSaysWhatToDo) {
+  expect("[structure.move.z0]\nacceleration = [1, 0, 0]\n", {"case.toml:9:", "structure.move.z0.acceleration needs a record"});
+  expect("[structure.move.z0]\nacceleration = [1, 0, 0]\nvelocity = [1, 0, 0]\n", {"has both velocity and acceleration"});
+  expect("[structure.move.z0]\nvelocity = [1, 0, 0]\nbaseline = \"raw\"\n", {"structure.move.z0.baseline belongs to an acceleration"});
+  expect("[structure.move.z0]\nacceleration = [1, 0, 0]\namplitude = [[0, 0], [1, 1], [2, 0]]\n", {"no error"});
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 
 #include "fem/structure.h"
@@ -116,7 +117,7 @@ TEST_F(AMovingStructure, TakesStepsNoLongerThanTheCaseSays) {
 // Rejected iterations leave no trace: the bits are those of a run that never had them.
 TEST_F(AMovingStructure, ReturnsToASavedStateBitForBit) {
   for (const std::string scheme : {"", "generalised_alpha = { spectral_radius = 0.8 }\n",
-                                   "newmark = { beta = 0.3, gamma = 0.55 }\n"}) {
+                                   "newmark = { beta = 0.3, gamma = 0.55 }\n", "displacements = \"large\"\n"}) {
     const auto more = scheme + "rayleigh = { mass = 2, stiffness = 1e-5 }\nstep = 5e-5\n";
     const auto output =
         "[structure.fix.z0]\n[structure.load.x1]\npressure = 1e4\namplitude = [[0, 0], [4e-4, "
@@ -137,6 +138,54 @@ TEST_F(AMovingStructure, ReturnsToASavedStateBitForBit) {
       EXPECT_EQ(a.quantities, b.quantities);
     }
   }
+}
+
+// A checkpoint amid a motion, and another process of the same case that goes on from it: bit for bit what goes on without.
+TEST_F(AMovingStructure, ResumesBitForBit) {
+  const auto folder = std::filesystem::path(write_file("marker", "")).parent_path() / "checkpoint";
+  std::filesystem::create_directories(folder);
+  for (const std::string scheme : {"", "generalised_alpha = { spectral_radius = 0.8 }\n", "newmark = { beta = 0.3, gamma = 0.55 }\n",
+                                   "displacements = \"large\"\n"}) {
+    const auto more = scheme + "rayleigh = { mass = 2, stiffness = 1e-5 }\nstep = 5e-5\n";
+    const auto output = "[structure.fix.z0]\n[structure.load.x1]\npressure = 1e4\namplitude = [[0, 0], [4e-4, 1]]\n[structure.output]\nenergy = true\n";
+    auto straight = make(more, output), resumed = make(more, output);
+    const auto force = pressure(straight.start(run()), 1e4);
+    for (int w = 0; w < 3; ++w) straight.advance(window(w), {{"z1", "force", force}});
+    straight.checkpoint(folder.string());
+    auto again = run();
+    again.resumes = true;
+    resumed.start(again);
+    resumed.resume(folder.string());
+    for (int w = 3; w < 6; ++w) {
+      const auto a = straight.advance(window(w), {{"z1", "force", force}}), b = resumed.advance(window(w), {{"z1", "force", force}});
+      EXPECT_EQ(a.fields[0].values, b.fields[0].values) << scheme;
+      EXPECT_EQ(a.fields[1].values, b.fields[1].values) << scheme;
+      EXPECT_EQ(a.quantities, b.quantities) << scheme;
+    }
+  }
+}
+
+// Under large displacements it bends far and springs back: the balance of energy is to 1e-9, and what it turns with is not small.
+TEST_F(AMovingStructure, SwingsThroughLargeDisplacements) {
+  const auto text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [1, 0.02], cells = [16, 1] } }\nanalysis = \"dynamic\"\n"
+      "displacements = \"large\"\nstart = \"rest\"\n[structure.material]\nyoung = 1e7\npoisson = 0.3\ndensity = 1000\nlaw = \"neo_hooke\"\n"
+      "[structure.fix.x0]\n[structure.output]\nenergy = true\n";
+  Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  auto alone = run(0);
+  alone.uses.clear();
+  alone.gravity[1] = -gravity;
+  structure.start(alone);
+  double farthest = 0;
+  for (int w = 0; w < 100; ++w) {
+    const auto found = quantities(structure.advance({w, w + 1, 0.01 * w, 0.01}, {}));
+    EXPECT_NEAR(found.at("energy.error"), 0, 1e-9 * 1000 * 0.02 * gravity);
+    farthest = std::max(farthest, found.at("displacement.max"));
+  }
+  EXPECT_GT(farthest, 0.7);
+  const auto lines = explain(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  EXPECT_NE(lines.find("dynamic geometrically nonlinear elasticity"), std::string::npos) << lines;
+  EXPECT_NE(lines.find("energy and momentum kept"), std::string::npos) << lines;
 }
 
 // 1e-9 of the work: residuals of the solve, of some 1e-13 of the forces, times the displacements.

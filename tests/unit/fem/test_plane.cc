@@ -170,8 +170,8 @@ TEST(StructuresInThePlane, MoveAndTurnFreelyWhenNothingHoldsThem) {
   EXPECT_NE(failure("displacements = \"large\"\nlocking = \"b_bar\"\n" + steel)
                 .find("do not go together"),
             std::string::npos);
-  EXPECT_NE(failure("displacements = \"large\"\nanalysis = \"dynamic\"\n" + steel)
-                .find("for analysis = \"static\" alone"),
+  EXPECT_NE(failure("displacements = \"large\"\nanalysis = \"dynamic\"\nnewmark = { beta = 0.25 }\n" + steel)
+                .find("structure.newmark belongs to displacements = \"small\""),
             std::string::npos);
   EXPECT_NE(failure("thickness = 0\n" + steel).find("structure.thickness"), std::string::npos);
   EXPECT_NE(failure(steel + "[structure.fix.x0]\n[structure.load.y1]\nline_force = [0, 1]\n")

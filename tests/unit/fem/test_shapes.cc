@@ -123,6 +123,36 @@ TEST(ACylinder, IsAnAnnulusWithAHeight) {
 // An arc takes the faces whose middles lie in it, ends included: of 30 around, with middles at 6°,
 // 18°, …, those from 30° to 150° are 11; from 350° to 370°, past the x axis, two. `outside` is
 // meant where there is such a group.
+// A disc's area and its rim are those of the circle, to the error of parabolas through three points of arcs of 90°/n: of order 4. Of first order
+// they are those of the polygon of 4 n corners.
+TEST(ADisc, IsRoundToTheOrderOfItsCells) {
+  const double radius = 1.5;
+  std::vector<double> errors;
+  for (const int n : {1, 2, 4}) {
+    const auto text = "disc = { radius = 1.5, centre = [3, -1], cells = " + std::to_string(n) + " }";
+    const Mesh mesh = make(text, 2, 2);
+    EXPECT_EQ(mesh.cells(), static_cast<std::size_t>(n * n + 4 * n * ((n + 1) / 2)));
+    EXPECT_EQ(mesh.boundary().size(), static_cast<std::size_t>(4 * n));
+    EXPECT_EQ(mesh.boundary("outside").size(), static_cast<std::size_t>(4 * n));
+    for (const auto& face : mesh.boundary("outside"))
+      for (const auto node : face.used()) EXPECT_NEAR((mesh.points()[node] - Vec3(3, -1, 0)).norm(), radius, 1e-14);
+    errors.push_back(std::abs(mesh.volume() - pi * radius * radius));
+    EXPECT_NEAR(make(text, 2, 1).volume(), 0.5 * 4 * n * radius * radius * std::sin(pi / (2 * n)), 1e-13);
+  }
+  EXPECT_NEAR(std::log2(errors[0] / errors[1]), 4, 0.2);
+  EXPECT_NEAR(std::log2(errors[1] / errors[2]), 4, 0.1);
+}
+
+TEST(ARod, IsADiscWithAHeight) {
+  const Mesh mesh = make("rod = { radius = 0.5, height = 2, cells = [3, 4] }", 3, 2);
+  EXPECT_EQ(mesh.cells(), (9u + 4 * 3 * 2) * 4);
+  const double parabolas = 2e-4;  // their error through arcs of 30°
+  EXPECT_NEAR(mesh.volume(), pi * 0.25 * 2, parabolas * pi * 0.25 * 2);
+  EXPECT_NEAR(measure(mesh, mesh.boundary("z1")), pi * 0.25, parabolas * pi * 0.25);
+  EXPECT_NEAR(measure(mesh, mesh.boundary("outside")), 2 * pi * 0.5 * 2, 1e-3);
+  EXPECT_EQ(mesh.boundary().size(), mesh.boundary("outside").size() + mesh.boundary("z0").size() + mesh.boundary("z1").size());
+}
+
 TEST(AnArc, HoldsTheFacesWithTheirMiddlesInIt) {
   const auto mesh =
       make("annulus = { inner = 0.04, outer = 0.05, centre = [0.6, 0.3], cells = [1, 30] }", 2);

@@ -3,12 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
 
+#include "fem/program.h"
 #include "gmsh_writer.h"
+#include "io/series.h"
 #include "tractions.h"
 
 namespace acopla::fem::test {
@@ -133,6 +138,22 @@ TEST_F(AStructure, ReportsPointsAndTheReactionOfEachSupport) {
 }
 
 // Springs under a block carry its weight, and count with the reactions.
+// Equilibrium of moments: about any axis the supports turn the body back by what the loads turn it. The weight of 2 m³ at the middle of the
+// block, a received pressure of the same resultant line, and a point force at the corner (2, 1, 0.5): about y through (0, 0, 0), z × … by hand.
+TEST_F(AStructure, ReportsTorquesAboutAxes) {
+  auto structure = make("density = 2000\n[structure.load.corner]\npoint_force = [0, 0, -500]\n",
+                        "[structure.fix.z0]\n[structure.output.torque.about_y]\naxis = [0, 2, 0]\n"
+                        "[structure.output.torque.tilted]\nabout = [0.3, -1, 2]\naxis = [1, 2, -1]\n");
+  const auto surfaces = structure.start(run());
+  const auto pressure = traction_loads(surfaces[0].mesh, [](const Vec3&, const Vec3& n) { return Vec3(-1000 * n); });
+  const auto found = quantities(structure.advance(window(0), {{"z1", "force", pressure}}));
+  const double exact = density * 1.0 * gravity * 1.0 + 1000 * 2 * 1.0 + 500 * 2;  // −z forces turn by +x F about y
+  EXPECT_NEAR(found.at("about_y.torque.load"), exact, 1e-10 * exact);
+  EXPECT_NEAR(found.at("about_y.torque.reaction"), -exact, 1e-9 * exact);
+  EXPECT_NEAR(found.at("tilted.torque.reaction"), -found.at("tilted.torque.load"), 1e-9 * exact);
+  EXPECT_GT(std::abs(found.at("tilted.torque.load")), 0.01 * exact);
+}
+
 TEST_F(AStructure, ReactsWithItsFoundation) {
   auto structure = make("density = 2000\n", "[structure.foundation.z0]\nstiffness = 1e6\ndirections = \"all\"\n");
   protocol::Run alone = run();
@@ -258,6 +279,59 @@ TEST_F(Pictures, OfRejectedIterationsAreNotKept) {
   EXPECT_EQ(count(), 1);
 }
 
+// In one file beside or instead of them: the nodal fields at the times of the pictures, and after a resumption the rows until then.
+TEST_F(Pictures, ComeAsRowsOfNumbersOnRequest) {
+  const std::string output = "[structure.load.x1]\npressure = 1e5\namplitude = [[0, 0], [1, 1]]\n[structure.output]\nvtu = false\nhdf5 = true\nevery = 0.02\n";
+  const auto checkpoint = folder_.parent_path() / "checkpoint";
+  std::filesystem::create_directories(checkpoint);
+  auto structure = make(output);
+  const auto surfaces = structure.start(drawing());
+  std::vector<std::vector<Vec3>> sent;
+  for (int w = 0; w < 6; ++w) {
+    sent.push_back(structure.advance(window(w), {}).fields[0].values);
+    if (w == 3) structure.checkpoint(checkpoint.string());
+  }
+  structure.finish();
+  EXPECT_EQ(count(), 0);
+  const auto check = [&] {
+    const io::SeriesReader file((folder_ / "structure.h5").string());
+    ASSERT_EQ(file.windows(), 3u);
+    const auto mesh = file.surface("mesh");
+    for (std::size_t row = 0; row < 3; ++row) {
+      EXPECT_NEAR(file.window(row).second, 0.02 * static_cast<double>(row + 1), 1e-12);
+      const auto moved = file.field("mesh", "displacement", row);
+      for (std::size_t i = 0; i < surfaces[0].mesh.points.size(); ++i) {
+        const auto& p = surfaces[0].mesh.points[i];
+        const auto at = std::find(mesh.points.begin(), mesh.points.end(), p) - mesh.points.begin();
+        EXPECT_EQ(moved.at(static_cast<std::size_t>(at)), sent[2 * row + 1][i]);
+      }
+      const auto principal = file.field("mesh", "principal_stress", row);
+      EXPECT_LT(std::min_element(principal.begin(), principal.end(), [](const Vec3& a, const Vec3& b) { return a[2] < b[2]; })->z(), 0);
+    }
+  };
+  check();
+  auto resumed = make(output);
+  auto again = drawing();
+  again.resumes = true;
+  resumed.start(again);
+  resumed.resume(checkpoint.string());
+  for (int w = 4; w < 6; ++w) resumed.advance(window(w), {});
+  resumed.finish();
+  check();
+}
+
+// Several processes of mpirun would overwrite each other.
+TEST(TheProgram, RefusesToRunSeveralTimesAtOnce) {
+  setenv("OMPI_COMM_WORLD_SIZE", "2", 1);
+  try {
+    program().make(io::Table::from_text("", "case.toml"), "structure");
+    ADD_FAILURE() << "no error";
+  } catch (const io::UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("runs as one process, and mpirun started 2"), std::string::npos) << error.what();
+  }
+  unsetenv("OMPI_COMM_WORLD_SIZE");
+}
+
 TEST_F(Pictures, CanBeTurnedOff) {
   auto structure = make("[structure.output]\nvtu = false\n");
   structure.start(drawing());
@@ -284,6 +358,23 @@ TEST(Explanation, WarnsOfAMeshInMillimetres) {
   const auto lines = explain(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
   EXPECT_NE(lines.find("warning: the mesh is 2002 m large. Lengths are metres"), std::string::npos)
       << lines;
+}
+
+// A run says it too, in the log of the structure, and goes on.
+TEST_F(AStructure, WarnsOfAMeshInMillimetres) {
+  const auto text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [2000, 100], cells = [2, 1] } }\n"
+      "[structure.material]\nyoung = 1e9\npoisson = 0.2\n[structure.fix.x0]\n";
+  Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  auto alone = run();
+  alone.uses.clear();
+  testing::internal::CaptureStderr();
+  structure.start(alone);
+  const auto said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("case.toml:3:1: warning: structure.mesh: the mesh is 2002 m large. Lengths are metres: was it drawn in millimetres?"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(structure.advance(window(0), {}).steps, 1u);
 }
 
 }  // namespace
