@@ -8,6 +8,8 @@ if(ACOPLA_FEM)
   install(TARGETS acopla-fem COMPONENT programs RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
+install(FILES ${PROJECT_SOURCE_DIR}/protocol/python/acopla.py COMPONENT programs DESTINATION ${CMAKE_INSTALL_DATADIR}/acopla/python)
+
 # acopla::laws, the one target that a library of laws links: where the headers are, and the options of this program's own kernels. The
 # instruction set must be the same, as it decides how many contacts a pack holds. Nothing is left open to the program that loads the
 # library, and what two libraries call by the same name stays apart.
