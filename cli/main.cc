@@ -11,7 +11,7 @@ namespace acopla::cli {
 namespace {
 
 struct Arguments {
-  std::string case_file, results, record, replay_as, replay_of;
+  std::string case_file, results, resume, record, replay_as, replay_of;
   std::optional<double> from, to;
   double at = 0;
 };
@@ -52,6 +52,8 @@ int main_program(int argc, char** argv) {
       "run", "run a case: start its processes, watch them, show progress and results");
   add_case(run_command, arguments);
   add_results(run_command, arguments);
+  run_command->add_option("--resume", arguments.resume, "results of a run that was stopped: go on from its last checkpoint, in the same folder")
+      ->excludes("--results");
   auto* check_command =
       app.add_subcommand("check", "check a case and the files it names, without running it");
   add_case(check_command, arguments);
@@ -64,7 +66,7 @@ int main_program(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? io::exit_done : io::exit_user_error;
   }
-  if (*run_command) return run({arguments.case_file, arguments.results, std::nullopt});
+  if (*run_command) return run({arguments.case_file, arguments.results, std::nullopt, arguments.resume});
   if (*check_command) return check(arguments.case_file);
   if (*explain_command) return explain(arguments.case_file);
   if (*replay_command)

@@ -21,6 +21,7 @@
 #include "cli/participants.h"
 #include "cli/process.h"
 #include "cli/workplace.h"
+#include "coupler/checkpoint.h"
 #include "coupler/outcome.h"
 #include "coupler/outside.h"
 #include "io/results.h"
@@ -144,6 +145,7 @@ void Launch::start_coupler() {
   auto command = coupler_command(options_.case_file, options_.substitute);
   command.words.insert(command.words.end(),
                        {"--bind", workplace_.endpoint(), "--results", results_, "--supervised"});
+  if (!options_.resume.empty()) command.words.push_back("--resume");
   children_.push_back(
       std::make_unique<Child>("coupler", "acopla-coupler", command,
                               Child::Streams{log_of("coupler"), input[0], output[1]}));
@@ -362,7 +364,14 @@ int run(const RunOptions& options) {
     command_of(participant, options.case_file, "");  // says so before a results folder is made
     ++processes;
   }
-  const auto results = io::make_results_folder(options.case_file, options.results);
+  std::string results;
+  if (options.resume.empty()) {
+    results = io::make_results_folder(options.case_file, options.results);
+  } else {
+    results = std::filesystem::absolute(options.resume).lexically_normal().string();
+    while (results.ends_with('/')) results.pop_back();
+    coupler::Checkpoints(read, results, true);  // says what is wrong before anybody is started
+  }
   fmt::print("{}: {} processes, results in {}\n", read.title, processes, shown_path(results));
   std::fflush(stdout);
   return Launch(options, read, results).run();

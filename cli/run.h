@@ -11,7 +11,8 @@ namespace acopla::cli {
 struct RunOptions {
   std::string case_file;
   std::string results;                            ///< empty: results/NAME-NNN
-  std::optional<coupler::Substitute> substitute;  ///< acopla replay
+  std::optional<coupler::Substitute> substitute = {};  ///< acopla replay
+  std::string resume = {};  ///< results of a run that is gone on with; `results` is empty then
 };
 
 /// @return the exit code. @throws io::UserError for a case that cannot be started

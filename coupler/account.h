@@ -37,6 +37,14 @@ class Account {
                   std::map<std::string, std::vector<geometry::Vec3>>& received) const;
 
   void begin();  ///< computing begins
+  void flush() { record_.flush(); }  ///< all windows are on disk
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("complete", complete_);
+    archive("ledgers", ledgers_);
+    for (auto& interface : interfaces_) archive("worst_loss." + interface.name, interface.worst_loss);
+    archive("quantities", quantities_);
+  }
   /// Writes the next window, and compares it with the limits. @throws Failure beyond one
   void close(WindowRecord& window);
 

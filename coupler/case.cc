@@ -274,6 +274,8 @@ void read_coupling(const io::Table& root, Case& read) {
   // About twenty pictures are enough to see a run and small beside its series.
   const double every = coupling.number("output_every", io::positive, read.end / 20);
   read.output_every = std::max<std::int64_t>(1, std::llround(std::min(every / read.window, 1e12)));
+  if (const auto pause = coupling.optional_number("checkpoint_every", io::positive))
+    read.checkpoint_every = std::max<std::int64_t>(1, std::llround(std::min(*pause / read.window, 1e12)));
   const auto limits = coupling.table_or_empty("limits");
   read.limits.force_loss = limits.number("force_loss", io::non_negative, read.limits.force_loss);
   read.limits.moment_loss = limits.number("moment_loss", io::non_negative, read.limits.moment_loss);
@@ -384,6 +386,8 @@ Case read_case(const io::Table& root, const std::optional<Substitute>& substitut
   read_coupling(root, read);
   read_expectations(root, read);
   root.reject_unknown();
+  read.text = root.canonical({"title", "end", "coupling.output_every", "coupling.checkpoint_every"}) +
+              fmt::format(" {} {}", read.load_start, read.load_end);  // of which the end is the default
   return read;
 }
 

@@ -98,11 +98,17 @@ struct Case {
   double max_distance = 0;        ///< [m]
   double start_limit = 60;        ///< [s]
   std::int64_t output_every = 1;  ///< windows between pictures
+  std::int64_t checkpoint_every = 0;  ///< windows; 0: none are written
+  std::string text;  ///< what it says, but for what may change when a run is resumed; where that can be asked for
   LedgerLimits limits;
   std::vector<InterfaceCase> interfaces;  ///< none where a participant is alone
   std::vector<ParticipantCase> participants;
   std::vector<Expectation> expectations;
 
+  /// The last window that may be complete before a checkpoint is written, when so many are.
+  std::int64_t next_checkpoint(std::int64_t complete) const {
+    return checkpoint_every > 0 ? (complete / checkpoint_every + 1) * checkpoint_every : windows;
+  }
   double time(std::int64_t windows_done) const {
     return static_cast<double>(windows_done) * window;
   }

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "coupler/account.h"
+#include "coupler/checkpoint.h"
 #include "coupler/crew.h"
 #include "coupler/failure.h"
 #include "coupler/one_way.h"
@@ -20,6 +21,7 @@ namespace {
 
 // The stages of a run, kept so that a failure in any of them still finds what the others came to.
 struct Stages {
+  explicit Stages(const Case& read) : quantities(read.expectations) {}
   Quantities quantities;
   std::optional<Record> record;
   std::optional<Account> account;
@@ -31,15 +33,20 @@ std::unique_ptr<Scheme> scheme_of(const Case& read, Crew& crew, Account& account
   return std::make_unique<TwoWay>(read, crew, account, reporter);
 }
 
-void compute(const Case& read, Crew& crew, const std::string& results, Reporter& reporter,
+void compute(const Case& read, Crew& crew, const Coupler::Options& options, Checkpoints& checkpoints, Reporter& reporter,
              Stages& stages, std::chrono::steady_clock::time_point begin) {
   crew.assemble();
-  stages.record.emplace(read, results);
-  stages.account.emplace(read, crew, *stages.record, stages.quantities, reporter);
-  stages.scheme = scheme_of(read, crew, *stages.account, reporter);
+  stages.record.emplace(read, options.results, checkpoints.windows());
+  auto& account = stages.account.emplace(read, crew, *stages.record, stages.quantities, reporter);
+  stages.scheme = scheme_of(read, crew, account, reporter);
+  if (options.resumes) checkpoints.resume(crew, account, *stages.scheme);
   reporter.assembled(
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-  stages.scheme->run();
+  account.begin();
+  while (account.complete() < read.windows) {
+    stages.scheme->step();
+    if (checkpoints.due(account.complete()) && !options.results.empty()) checkpoints.write(crew, account, *stages.scheme);
+  }
   for (const auto& [name, value] : crew.finish()) stages.quantities.add(name, read.end, value);
 }
 
@@ -56,10 +63,10 @@ int exit_code_of(Failure::Cause cause) {
 }
 
 // Runs the stages and turns whatever ends them early into words.
-void attempt(const Case& read, Crew& crew, const std::string& results, Reporter& reporter,
+void attempt(const Case& read, Crew& crew, const Coupler::Options& options, Checkpoints& checkpoints, Reporter& reporter,
              Stages& stages, std::chrono::steady_clock::time_point begin, Outcome& outcome) {
   try {
-    compute(read, crew, results, reporter, stages, begin);
+    compute(read, crew, options, checkpoints, reporter, stages, begin);
     outcome.status = Status::met;
     outcome.exit_code = io::exit_done;
   } catch (const Interrupted& interrupted) {
@@ -102,11 +109,12 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
 
 Outcome Coupler::run() {
   const auto begin = std::chrono::steady_clock::now();
-  Crew crew(context_, options_.endpoint, case_, options_.results, reporter_, options_.outside);
+  Checkpoints checkpoints(case_, options_.results, options_.resumes);
+  Crew crew(context_, options_.endpoint, case_, options_.results, reporter_, options_.outside, options_.resumes);
   Outcome outcome;
   {
-    Stages stages;
-    attempt(case_, crew, options_.results, reporter_, stages, begin, outcome);
+    Stages stages(case_);
+    attempt(case_, crew, options_, checkpoints, reporter_, stages, begin, outcome);
     gather(case_, crew, stages, outcome);
   }  // the series are closed before the summary says that they are there
   outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

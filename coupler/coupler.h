@@ -17,6 +17,7 @@ class Coupler {
     std::string endpoint;        ///< to bind: ipc://…, tcp://127.0.0.1:PORT, inproc://…
     std::string results;         ///< an existing folder; empty: nothing is written
     Outside* outside = nullptr;  ///< signals and the launcher; may be null
+    bool resumes = false;        ///< goes on from the checkpoint in `results`
   };
   /// @param context  shared with participants over inproc. Everything must outlive the coupler.
   Coupler(zmq::context_t& context, const Case& read, Options options, Reporter& reporter)

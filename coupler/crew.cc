@@ -40,9 +40,10 @@ std::string printable(std::string text) {
 }  // namespace
 
 Crew::Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
-           const std::string& results, Reporter& reporter, Outside* outside)
+           const std::string& results, Reporter& reporter, Outside* outside, bool resumes)
     : case_(read),
       results_(results),
+      resumes_(resumes),
       reporter_(reporter),
       outside_(outside),
       hub_(context, endpoint),
@@ -95,14 +96,24 @@ void Crew::begin_advance(const std::string& participant, std::int64_t start, std
   request(member, protocol::advance_message(window, fields));
 }
 
-void Crew::ask(const std::vector<std::string>& participants, Kind kind) {
-  const auto what = kind == Kind::save ? "saving its state" : "returning to the window's start";
+std::vector<std::string> Crew::everybody() const {
+  std::vector<std::string> names;
+  for (const auto& [name, member] : members_) names.push_back(name);
+  return names;
+}
+
+void Crew::ask(const std::vector<std::string>& participants, Kind kind, const std::string& folder) {
+  const auto what = kind == Kind::save         ? "saving its state"
+                    : kind == Kind::checkpoint ? "writing a checkpoint"
+                    : kind == Kind::resume     ? "resuming from a checkpoint"
+                                               : "returning to the window's start";
   for (const auto& name : participants) {
     auto& member = members_.at(name);
     if (member.replay) continue;  // what it plays follows from the window alone
     enter(member, Member::Phase::returning, what);
     Message message;
     message.kind = kind;
+    if (!folder.empty()) message = protocol::folder_message(kind, folder);
     request(member, std::move(message));
   }
   const auto busy = [&](const std::string& name) { return members_.at(name).phase == Member::Phase::returning; };
@@ -257,6 +268,11 @@ void Crew::admit(const std::string& peer, const Message& message) {
     refuse(peer, why);
     fail(member, why);
   }
+  if ((case_.checkpoint_every > 0 || resumes_) && std::find(can.begin(), can.end(), "checkpoint") == can.end()) {
+    const auto why = "cannot write or resume from checkpoints (it does not offer \"checkpoint\"), which coupling.checkpoint_every asks of everybody. Leave that out";
+    refuse(peer, why);
+    fail(member, why);
+  }
   member.peer = peer;
   if (member.outcome.solver.empty()) member.outcome.solver = hello.introduction.solver;
   enter(member, Member::Phase::starting, "starting");
@@ -398,6 +414,7 @@ protocol::Run Crew::run_for(const ParticipantCase& participant) const {
   run.tick = case_.window;
   run.end = case_.windows;
   run.window = 1;
+  run.resumes = resumes_;
   std::copy(case_.gravity.data(), case_.gravity.data() + 3, run.gravity);
   if (!results_.empty()) run.results = results_ + "/" + participant.name;
   const auto use = [&](const std::string& surface) -> protocol::Run::Use& {

@@ -30,7 +30,7 @@ class Crew {
   /// Binds the hub and the pulse. @param outside may be null. @throws io::UserError when the
   /// address is taken
   Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
-       const std::string& results, Reporter& reporter, Outside* outside);
+       const std::string& results, Reporter& reporter, Outside* outside, bool resumes = false);
 
   /// Waits until everybody said hello and sent its surfaces. @throws Failure, Interrupted
   void assemble();
@@ -47,6 +47,19 @@ class Crew {
   /// Everybody named remembers its state, or returns to it. All at once; done when all have answered. @throws Failure, Interrupted
   void save(const std::vector<std::string>& participants) { ask(participants, protocol::Kind::save); }
   void restore(const std::vector<std::string>& participants) { ask(participants, protocol::Kind::restore); }
+
+  /// Everybody writes a checkpoint into a folder, or returns to the one in it. @throws Failure, Interrupted
+  void checkpoint(const std::string& folder) { ask(everybody(), protocol::Kind::checkpoint, folder); }
+  void resume(const std::string& folder) { ask(everybody(), protocol::Kind::resume, folder); }
+  /// What the summary tells of the participants' work.
+  template <class Archive>
+  void state(Archive& archive) {
+    for (auto& [name, member] : members_) {
+      archive(name + ".steps", member.outcome.steps);
+      archive(name + ".seconds", member.outcome.seconds);
+      archive(name + ".waiting", member.outcome.seconds_waiting);
+    }
+  }
 
   /// Asks a participant, which must be idle, for the windows [start, end).
   void begin_advance(const std::string& participant, std::int64_t start, std::int64_t end,
@@ -77,7 +90,7 @@ class Crew {
       starting,
       idle,
       advancing,
-      returning,  // or saving
+      returning,  // or saving, or at a checkpoint
       finishing,
       finished
     } phase = Phase::absent;
@@ -89,7 +102,8 @@ class Crew {
     ParticipantOutcome outcome;
   };
 
-  void ask(const std::vector<std::string>& participants, protocol::Kind kind);
+  std::vector<std::string> everybody() const;
+  void ask(const std::vector<std::string>& participants, protocol::Kind kind, const std::string& folder = {});
   void turn(std::chrono::milliseconds wait);
   void hear(protocol::Arrival arrival);
   void hear_member(Member& member, const protocol::Message& message);
@@ -112,6 +126,7 @@ class Crew {
 
   const Case& case_;
   std::string results_;
+  bool resumes_;
   Reporter& reporter_;
   Outside* outside_;
   protocol::Hub hub_;

@@ -19,7 +19,7 @@ struct Arguments {
   std::string record, replay_as, replay_of;
   std::optional<double> replay_from, replay_to;
   double replay_at = 0;
-  bool supervised = false, check = false;
+  bool supervised = false, check = false, resumes = false;
 };
 
 std::optional<Substitute> substitute(const Arguments& arguments) {
@@ -46,12 +46,13 @@ int run(const Arguments& arguments) {
   const auto read = read_case(io::Table::from_file(arguments.case_file), substitute(arguments));
   if (arguments.check) return check(read);
   // The launcher has made the folder already, for everybody's logs.
-  const auto results = arguments.supervised
+  const auto results = arguments.supervised || arguments.resumes
                            ? arguments.results
                            : io::make_results_folder(arguments.case_file, arguments.results);
+  if (arguments.resumes && results.empty()) throw io::UserError("--resume goes on with a run: name its folder with --results.");
   zmq::context_t context;
   const auto outcome =
-      Coupler(context, read, {arguments.endpoint, results, &outside}, *reporter).run();
+      Coupler(context, read, {arguments.endpoint, results, &outside, arguments.resumes}, *reporter).run();
   if (!arguments.supervised) fmt::print("results in {}\n", results);
   return outcome.exit_code;
 }
@@ -60,7 +61,8 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("case", arguments.case_file, "the case file, e.g. case.toml")->required();
   app.add_option("--bind", arguments.endpoint,
                  "address for the participants, ipc:///PATH or tcp://127.0.0.1:PORT");
-  app.add_option("--results", arguments.results, "folder for the results (must not exist)");
+  app.add_option("--results", arguments.results, "folder for the results (must not exist, unless a run is resumed)");
+  app.add_flag("--resume", arguments.resumes, "go on from the checkpoint in the results folder");
   app.add_option("--replay", arguments.record,
                  "a record that plays the part of a participant that sends");
   app.add_option("--replay-as", arguments.replay_as,

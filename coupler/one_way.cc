@@ -24,14 +24,42 @@ OneWay::OneWay(const Case& read, Crew& crew, Account& account)
   }
 }
 
-void OneWay::run() {
-  account_.begin();
-  while (account_.complete() < case_.windows) {
+void OneWay::step() {
+  const auto before = account_.complete();
+  while (account_.complete() == before) {
     begin_what_can_begin();
     take(crew_.next_answer());
     while (account_.complete() < case_.windows && is_complete(account_.complete())) close_window();
   }
 }
+
+// At a checkpoint everybody is through the same windows; of a mean there may be a part.
+template <class Archive>
+void OneWay::state(Archive& archive) {
+  for (auto& [name, answered] : senders_) archive("sender." + name, answered);
+  for (auto& [name, receiver] : receivers_) {
+    archive("receiver." + name + ".next", receiver.next);
+    archive("receiver." + name + ".answered", receiver.answered);
+  }
+  auto spans = static_cast<std::int64_t>(loads_.size());
+  archive("spans", spans);
+  auto load = loads_.begin();
+  for (std::int64_t k = 0; k < spans; ++k) {
+    std::int64_t index = 0;
+    std::vector<std::string> surfaces;
+    if constexpr (!Archive::reading) {
+      index = load->first;
+      for (const auto& [surface, forces] : load->second) surfaces.push_back(surface);
+    }
+    const auto name = "span" + std::to_string(k);
+    archive(name, index);
+    archive(name + ".surfaces", surfaces);
+    for (const auto& surface : surfaces) archive(name + "." + surface, loads_[index][surface]);
+    if constexpr (!Archive::reading) ++load;
+  }
+}
+template void OneWay::state(io::StateWriter&);
+template void OneWay::state(io::StateReader&);
 
 std::int64_t OneWay::span_count() const {
   return case_.loads == Loads::history ? case_.windows - case_.loads_from : 1;
@@ -52,7 +80,7 @@ void OneWay::begin_what_can_begin() {
   // Receivers first: where a sender plays in this process, beginning it takes its time.
   for (auto& [name, receiver] : receivers_) begin_receiver(name, receiver);
   for (const auto& [name, answered] : senders_) {
-    if (sender_busy_[name] || answered >= std::min(case_.windows, account_.complete() + lead)) continue;
+    if (sender_busy_[name] || answered >= std::min({case_.windows, account_.complete() + lead, case_.next_checkpoint(account_.complete())})) continue;
     sender_busy_[name] = true;
     crew_.begin_advance(name, answered, answered + 1, {});
   }

@@ -13,7 +13,7 @@
 
 namespace acopla::coupler {
 
-/// Runs all windows. Senders compute one window ahead of the slowest receiver, so that both sides
+/// Senders compute one window ahead of the slowest receiver, so that both sides
 /// work at the same time; each window is recorded, in order, once everybody is through it.
 ///
 /// What receivers get: `history` every window from loads_from on, with the mean force of that
@@ -22,7 +22,9 @@ namespace acopla::coupler {
 class OneWay final : public Scheme {
  public:
   OneWay(const Case& read, Crew& crew, Account& account);
-  void run() override;
+  void step() override;
+  void write(io::StateWriter& writer) override { state(writer); }
+  void read(io::StateReader& reader) override { state(reader); }
 
  private:
   struct Receiver {
@@ -30,6 +32,8 @@ class OneWay final : public Scheme {
     std::int64_t answered = 0;
   };
 
+  template <class Archive>
+  void state(Archive& archive);
   void begin_what_can_begin();
   void begin_receiver(const std::string& name, Receiver& receiver);
   void take(Crew::Answer answer);

@@ -4,9 +4,14 @@
 
 namespace acopla::coupler {
 
+Quantities::Quantities(const std::vector<Expectation>& expectations) {
+  for (const auto& expectation : expectations) expected_.insert(expectation.name);
+}
+
 void Quantities::add(const std::string& name, double end, double value) {
   auto& reports = reports_[name];
   if (reports.empty()) order_.push_back(name);
+  else if (!expected_.count(name)) reports.clear();
   reports.emplace_back(end, value);
 }
 

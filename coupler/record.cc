@@ -9,18 +9,20 @@ namespace acopla::coupler {
 
 using geometry::Vec3;
 
-Record::Record(const Case& read, const std::string& folder)
-    : case_(read), folder_(folder), mapping_(read.interfaces.size(), {0, 0.0}) {
+Record::Record(const Case& read, const std::string& folder, std::int64_t resumes_after)
+    : case_(read), folder_(folder), resumes_after_(resumes_after), mapping_(read.interfaces.size(), {0, 0.0}) {
   if (folder_.empty()) return;
   std::filesystem::create_directories(folder_ + "/surfaces");
-  series_ = std::make_unique<io::SeriesWriter>(folder_ + "/interface.h5");
+  const auto file = folder_ + "/interface.h5";
+  series_ = resumes_after_ > 0 ? std::make_unique<io::SeriesWriter>(file, static_cast<std::size_t>(resumes_after_)) : std::make_unique<io::SeriesWriter>(file);
 }
 
 void Record::add_surface(const std::string& name, const geometry::SurfaceMesh& mesh) {
   if (!series_ || surfaces_.count(name)) return;
   series_->add_surface(name, mesh);
   surfaces_.emplace(name, mesh);
-  pictures_.emplace(name, io::PvdSeries(fmt::format("{}/{}.pvd", folder_, name)));
+  auto& pictures = pictures_.emplace(name, io::PvdSeries(fmt::format("{}/{}.pvd", folder_, name))).first->second;
+  if (resumes_after_ > 0) pictures.keep_until(case_.time(resumes_after_));
 }
 
 void Record::set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance) {

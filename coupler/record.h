@@ -40,7 +40,8 @@ struct WindowRecord {
 class Record {
  public:
   /// Writes into `folder`, or nothing at all where it is empty. @throws io::UserError
-  Record(const Case& read, const std::string& folder);
+  /// @param resumes_after  windows that a run before has written there and that stay
+  Record(const Case& read, const std::string& folder, std::int64_t resumes_after = 0);
   void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);
   /// What does not change: points without a partner, the farthest of those with one.
   void set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance);
@@ -50,6 +51,7 @@ class Record {
   /// Appends window `index`, which must follow the last one. The file is written and flushed at once where windows are long, and else some
   /// times a second, in one go: a flush costs more than a short window, and between two of them the file stays whole.
   void write(std::int64_t index, const WindowRecord& window);
+  void flush() { write_pending(); }
 
  private:
   void write_pending();
@@ -60,6 +62,7 @@ class Record {
 
   const Case& case_;
   std::string folder_;
+  std::int64_t resumes_after_;
   std::unique_ptr<io::SeriesWriter> series_;
   std::map<std::string, geometry::SurfaceMesh> surfaces_;
   std::map<std::string, io::PvdSeries> pictures_;

@@ -50,18 +50,36 @@ TwoWay::TwoWay(const Case& read, Crew& crew, Account& account, Reporter& reporte
   if (case_.scheme == SchemeKind::serial_implicit) acceleration_ = make_acceleration(case_.implicit.acceleration);
 }
 
-void TwoWay::run() {
-  account_.begin();
-  for (window_ = 0; window_ < case_.windows; ++window_) {
-    WindowRecord window;
-    switch (case_.scheme) {
-      case SchemeKind::parallel_explicit: step_in_parallel(window); break;
-      case SchemeKind::serial_implicit: step_with_iterations(window); break;
-      default: step_serially(window);
-    }
-    account_.close(window);
+void TwoWay::step() {
+  window_ = account_.complete();
+  WindowRecord window;
+  switch (case_.scheme) {
+    case SchemeKind::parallel_explicit: step_in_parallel(window); break;
+    case SchemeKind::serial_implicit: step_with_iterations(window); break;
+    default: step_serially(window);
   }
+  account_.close(window);
 }
+
+template <class Archive>
+void TwoWay::state(Archive& archive) {
+  for (auto& [surface, motion] : now_) {
+    archive("displacement." + surface, motion.displacement);
+    archive("velocity." + surface, motion.velocity);
+  }
+  archive("warned", warned_);
+  if (case_.scheme == SchemeKind::parallel_explicit)
+    for (const auto& link : account_.links()) {
+      if (!link.mapping) continue;
+      archive("last." + link.about->text() + ".received", last_forces_[link.about->to.text()]);
+      archive("last." + link.about->text() + ".sent", last_sent_[link.about->from.text()]);
+    }
+  if (!acceleration_) return;
+  if constexpr (Archive::reading) acceleration_->read(archive);
+  else acceleration_->write(archive);
+}
+template void TwoWay::state(io::StateWriter&);
+template void TwoWay::state(io::StateReader&);
 
 void TwoWay::step_serially(WindowRecord& window) {
   Forces forces;

@@ -31,7 +31,9 @@ class TwoWay final : public Scheme {
  public:
   /// @throws io::UserError where nobody answers, or a surface would be moved by two
   TwoWay(const Case& read, Crew& crew, Account& account, Reporter& reporter);
-  void run() override;
+  void step() override;
+  void write(io::StateWriter& writer) override { state(writer); }
+  void read(io::StateReader& reader) override { state(reader); }
 
  private:
   using Vectors = std::vector<geometry::Vec3>;
@@ -42,6 +44,8 @@ class TwoWay final : public Scheme {
   using Motions = std::map<std::string, Motion>;  // of the structures' surfaces, "structure.inside"
   using Forces = std::map<std::string, Vectors>;  // on them [N]
 
+  template <class Archive>
+  void state(Archive& archive);
   void step_serially(WindowRecord& window);
   void step_in_parallel(WindowRecord& window);
   void step_with_iterations(WindowRecord& window);

@@ -60,7 +60,8 @@ Head read_head(const StartFrom& start, const Scene& scene, io::StateReader& read
 
 }  // namespace
 
-void write_checkpoint(const std::string& path, const Scene& scene, const Engine& engine, const Traffic& traffic) {
+void write_checkpoint(const std::string& path, const Scene& scene, const Engine& engine, const Traffic& traffic,
+                      const std::function<void(io::StateWriter&)>& more) {
   Head head;
   head.dimension = scene.dimension;
   head.rotates = scene.rotates();
@@ -71,6 +72,7 @@ void write_checkpoint(const std::string& path, const Scene& scene, const Engine&
   writer("head", head);
   writer("engine", engine);
   writer("traffic", traffic);
+  more(writer);
   io::write_checkpoint(path, state, {program_version, scene.name, engine.time(), 0, description(scene)});
 }
 
@@ -105,7 +107,7 @@ Particles read_particles(const Scene& scene) {
   return particles;
 }
 
-void read_state(const Scene& scene, Engine& engine, Traffic& traffic) {
+void read_state(const Scene& scene, Engine& engine, Traffic& traffic, const std::function<void(io::StateReader&)>& more) {
   const auto [state, info] = io::read_checkpoint(scene.start_from->file);
   if (info.program_version != program_version || info.case_hash != description(scene))
     throw io::UserError(scene.start_from->where, fmt::format("start_from = \"{}\" is the state of another scene ({} of {}): materials, laws, walls, partitions, inlets and the "
@@ -116,6 +118,8 @@ void read_state(const Scene& scene, Engine& engine, Traffic& traffic) {
   reader("head", head);
   reader("engine", engine);
   reader("traffic", traffic);
+  if (!more) return;
+  more(reader);
   reader.finish();
 }
 

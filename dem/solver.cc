@@ -62,30 +62,42 @@ std::vector<protocol::Surface> Solver::start(const protocol::Run& run) {
   WallSet walls(scene_.walls);
   // Forces on vertices are summed only for walls that somebody wants them of.
   for (const auto wall : sent_) walls.send(wall);
+  std::vector<protocol::Surface> surfaces;
+  for (const auto& use : run.uses) surfaces.push_back({use.surface, walls.surface(wall_of(use.surface))});
+  open_pictures();
+  if (run.resumes) resuming_ = std::move(walls);
+  else begin(std::move(walls));
+  return surfaces;
+}
+
+void Solver::begin(WallSet walls) {
   auto particles = first_particles(walls);
   const auto by_itself = [](const Wall& wall) { return wall.motion.moves() && wall.motion.kind() != Motion::Kind::prescribed; };
   const bool apart = scene_.settling && std::any_of(scene_.walls.begin(), scene_.walls.end(), by_itself);
   if (apart) particles = settled_between_standing_walls(std::move(particles));
-  std::vector<protocol::Surface> surfaces;
-  for (const auto& use : run.uses) surfaces.push_back({use.surface, walls.surface(wall_of(use.surface))});
-  for (auto& wall : scene_.walls) wall.mesh = {};  // the engine has it now
-  engine_ = make_engine(scene_, std::move(particles), std::move(walls));
+  make(std::move(particles), std::move(walls));
   if (scene_.settling && !apart) settle(*engine_);
-  traffic_ = std::make_unique<Traffic>(scene_);
   if (scene_.start_from && scene_.start_from->whole) read_state(scene_, *engine_, *traffic_);
-  if (!run.results.empty() && scene_.write_particles) {
-    std::filesystem::create_directories(run.results);
-    pictures_ = std::make_unique<io::PvdSeries>(fmt::format("{}/{}.pvd", run.results, scene_.name));
-    for (std::size_t w = 0; w < scene_.walls.size(); ++w)
-      if (scene_.walls[w].motion.moves() && !scene_.walls[w].is_plane)
-        wall_pictures_.emplace_back(w, io::PvdSeries(fmt::format("{}/{}_{}.pvd", run.results, scene_.name, scene_.walls[w].name)));
-    if (scene_.output_every > 0) {
-      write_particles(0);
-      write_moving_walls(0);
-    }
+  if (pictures_ && scene_.output_every > 0) {
+    write_particles(0);
+    write_moving_walls(0);
   }
   next_picture_ = scene_.output_every;
-  return surfaces;
+}
+
+void Solver::make(Particles particles, WallSet walls) {
+  for (auto& wall : scene_.walls) wall.mesh = {};  // the engine has it now
+  engine_ = make_engine(scene_, std::move(particles), std::move(walls));
+  traffic_ = std::make_unique<Traffic>(scene_);
+}
+
+void Solver::open_pictures() {
+  if (run_.results.empty() || !scene_.write_particles) return;
+  std::filesystem::create_directories(run_.results);
+  pictures_ = std::make_unique<io::PvdSeries>(fmt::format("{}/{}.pvd", run_.results, scene_.name));
+  for (std::size_t w = 0; w < scene_.walls.size(); ++w)
+    if (scene_.walls[w].motion.moves() && !scene_.walls[w].is_plane)
+      wall_pictures_.emplace_back(w, io::PvdSeries(fmt::format("{}/{}_{}.pvd", run_.results, scene_.name, scene_.walls[w].name)));
 }
 
 Particles Solver::first_particles(const WallSet& walls) const {
@@ -221,9 +233,7 @@ void Solver::save() {
   io::StateWriter writer((saved_.clear(), saved_));
   writer("engine", *engine_);
   writer("traffic", *traffic_);
-  writer("steps", steps_);
-  writer("step_watch", step_watch_);
-  saved_next_picture_ = next_picture_;
+  state(writer);
 }
 
 void Solver::restore() {
@@ -231,10 +241,24 @@ void Solver::restore() {
   io::StateReader reader(saved_);
   reader("engine", *engine_);
   reader("traffic", *traffic_);
-  reader("steps", steps_);
-  reader("step_watch", step_watch_);
+  state(reader);
   reader.finish();
-  next_picture_ = saved_next_picture_;
+}
+
+void Solver::checkpoint(const std::string& folder) { write_state(fmt::format("{}/{}.h5", folder, scene_.name)); }
+
+void Solver::write_state(const std::string& path) {
+  write_checkpoint(path, scene_, *engine_, *traffic_, [this](io::StateWriter& writer) { state(writer); });
+}
+
+void Solver::resume(const std::string& folder) {
+  if (!resuming_) throw std::logic_error("resume of a run that has begun");
+  scene_.start_from = StartFrom{fmt::format("{}/{}.h5", folder, scene_.name), {}, true, {}};
+  make(read_particles(scene_), std::move(*resuming_));
+  resuming_.reset();
+  read_state(scene_, *engine_, *traffic_, [this](io::StateReader& reader) { state(reader); });
+  if (pictures_) pictures_->keep_until(engine_->time());
+  for (auto& [wall, series] : wall_pictures_) series.keep_until(engine_->time());
 }
 
 void Solver::write_output(const protocol::Window& window) {
@@ -246,7 +270,7 @@ void Solver::write_output(const protocol::Window& window) {
       write_moving_walls(window.end_time());
     }
     if (scene_.write_checkpoint && !run_.results.empty())
-      write_checkpoint(fmt::format("{}/checkpoint.h5", run_.results), scene_, *engine_, *traffic_);
+      write_state(fmt::format("{}/checkpoint.h5", run_.results));
   }
   while (scene_.output_every > 0 && next_picture_ <= window.end_time() * (1 + 1e-12)) next_picture_ += scene_.output_every;
 }

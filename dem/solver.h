@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,14 +26,28 @@ class Solver final : public protocol::Participant {
   /// Reads and checks the table. @throws io::UserError
   Solver(const io::Table& root, const std::string& name);
 
-  protocol::Introduction introduce() const override { return {"dem", scene_.dimension, {"save"}}; }
+  protocol::Introduction introduce() const override { return {"dem", scene_.dimension, {"save", "checkpoint"}}; }
   std::vector<protocol::Surface> start(const protocol::Run& run) override;
   protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override;
   std::vector<std::pair<std::string, double>> finish() override;
   void save() override;
   void restore() override;
+  void checkpoint(const std::string& folder) override;
+  void resume(const std::string& folder) override;
 
  private:
+  /// What only this class knows of a state.
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("steps", steps_);
+    archive("step_watch", step_watch_);
+    archive("next_picture", next_picture_);
+  }
+  void begin(WallSet walls);
+  void make(Particles particles, WallSet walls);
+  void open_pictures();
+  void write_state(const std::string& path);
+
   void check_uses(const protocol::Run& run);
   std::size_t wall_of(const std::string& surface) const;
   Particles first_particles(const WallSet& walls) const;
@@ -48,12 +63,12 @@ class Solver final : public protocol::Participant {
   Scene scene_;
   double largest_step_;
   StepWatch step_watch_;
+  std::optional<WallSet> resuming_;  // between start() and resume()
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<Traffic> traffic_;
   std::vector<std::size_t> sent_, received_;  // walls the coupling uses
   WallLoad load_;                             // mean over the window
   io::State saved_;
-  double saved_next_picture_ = 0;
   protocol::Run run_;
   std::unique_ptr<io::PvdSeries> pictures_;
   std::vector<std::pair<std::size_t, io::PvdSeries>> wall_pictures_;  // of walls that move and have vertices

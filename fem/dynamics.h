@@ -42,6 +42,15 @@ struct Motion {
   Vector acceleration;  ///< a [m/s²]; kept by the generalised-α method only
   Vector force;         ///< the received load of the window before [N]; the same
   double time = 0;      ///< [s]
+
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("displacement", displacement);
+    archive("velocity", velocity);
+    archive("acceleration", acceleration);
+    archive("force", force);
+    archive("time", time);
+  }
 };
 
 /// Energies at the end of a window and what passed in it [J].

@@ -15,6 +15,7 @@
 #include "fem/picture.h"
 #include "fem/statics.h"
 #include "fem/stress.h"
+#include "io/checkpoint.h"
 #include "io/vtk.h"
 
 namespace acopla::fem {
@@ -71,7 +72,7 @@ Structure::Structure(Settings settings) : settings_(std::move(settings)) {}
 Structure::~Structure() = default;
 
 protocol::Introduction Structure::introduce() const {
-  return {.solver = "fem", .dimension = settings_.dimension, .capabilities = {"save"}};
+  return {.solver = "fem", .dimension = settings_.dimension, .capabilities = {"save", "checkpoint"}};
 }
 
 namespace {
@@ -235,6 +236,11 @@ void Structure::check_frequencies() const {
 /// Equilibrium under weight and the loads at t = 0, or rest; and the factor of the first step.
 void Structure::begin_motion() {
   const auto& [mesh, materials, supports, loads] = body_->model;
+  const auto prepare = [&] {
+    const double window = run_.time(run_.window);
+    body_->dynamics->prepare(window / steps_in(window, settings_.motion->step));
+  };
+  if (run_.resumes) return prepare();
   auto& motion = state_.motion;
   motion.displacement = motion.velocity = mesh.zero();
   supports.place(0, motion.displacement);
@@ -249,8 +255,7 @@ void Structure::begin_motion() {
     statics.prepare();
     motion.displacement = statics.solve(load, {}, motion.displacement).displacement;
   }
-  const double window = run_.time(run_.window);
-  body_->dynamics->prepare(window / steps_in(window, settings_.motion->step));
+  prepare();  // once the factor of the statics is gone
   if (settings_.energy) {
     state_.passed = body_->dynamics->energy(motion);
     start_energy_ = state_.passed.kinetic + state_.passed.strain;
@@ -406,6 +411,45 @@ void Structure::save() {
 }
 
 void Structure::restore() { state_ = saved_; }
+
+namespace {
+constexpr const char* program_version = "acopla-fem 0.1.0";
+
+std::string checkpoint_file(const std::string& folder, const Settings& settings) { return fmt::format("{}/{}.h5", folder, settings.name); }
+}  // namespace
+
+template <class Archive>
+void Structure::checkpointed(Archive& archive) {
+  archive("motion", state_.motion);
+  archive("passed", state_.passed);
+  archive("drawn", state_.drawn);
+  archive("start_energy", start_energy_);
+  archive("worst_residual", worst_residual_);
+  archive("pictures", pictures_);
+}
+
+void Structure::checkpoint(const std::string& folder) {
+  if (state_.due) draw();
+  io::State state;
+  io::StateWriter writer(state);
+  checkpointed(writer);
+  io::write_checkpoint(checkpoint_file(folder, settings_), state,
+                       {program_version, settings_.name, state_.motion.time, 0, std::to_string(body_->model.mesh.unknowns())});
+}
+
+void Structure::resume(const std::string& folder) {
+  const auto path = checkpoint_file(folder, settings_);
+  const auto [state, info] = io::read_checkpoint(path);
+  io::check_origin(path, info, {program_version, settings_.name, 0, 0, std::to_string(body_->model.mesh.unknowns())});
+  io::StateReader reader(state);
+  checkpointed(reader);
+  reader.finish();
+  state_.due = false;
+  saved_ = state_;
+  if (!settings_.vtu || run_.results.empty() || pictures_ == 0) return;
+  series_.emplace((std::filesystem::path(run_.results) / (settings_.name + ".pvd")).string());
+  series_->keep_until(state_.motion.time);
+}
 
 std::vector<std::pair<std::string, double>> Structure::finish() {
   if (!state_.drawn) draw();

@@ -31,6 +31,8 @@ class Structure : public protocol::Participant {
   std::vector<std::pair<std::string, double>> finish() override;
   void save() override;
   void restore() override;
+  void checkpoint(const std::string& folder) override;
+  void resume(const std::string& folder) override;
 
  private:
   struct Body;
@@ -45,6 +47,8 @@ class Structure : public protocol::Participant {
   Response equilibrate(const protocol::Window& window, const Vector& force);
   Response move(const protocol::Window& window, const Vector& force);
   void begin_motion();
+  template <class Archive>
+  void checkpointed(Archive& archive);
   void check_frequencies() const;
   std::vector<std::pair<std::string, double>> frequencies() const;
   void find_probes();

@@ -119,6 +119,16 @@ concept FixedEigen = requires(T& value) {
   value.data();
 };
 
+/// A vector of Eigen whose length is known at run time.
+template <class T>
+concept LongEigen = requires(T& value) {
+  typename T::Scalar;
+  requires std::same_as<typename T::PlainObject, T>;
+  requires Number<typename T::Scalar>;
+  requires int{T::SizeAtCompileTime} < 0 && int{T::ColsAtCompileTime} == 1;
+  value.resize(1);
+};
+
 template <class T>
 inline constexpr bool plain_array = false;
 
@@ -170,7 +180,7 @@ inline constexpr Element element_of = archive::element_of_type<T>();
 ///   structures of these that can be copied byte by byte               one array of records (padding is saved as it is, and no
 ///                                                                     compiler tells a pointer inside: those need state())
 ///   std::span of these                                                one array, whose size must be the same on restoring
-///   std::vector of these, std::vector<bool>                           one array
+///   std::vector of these, std::vector<bool>, vectors of Eigen         one array
 ///   std::vector of std::vector of these, or of std::string            NAME.sizes, and NAME with the rows end to end
 ///   std::vector of pairs of these                                     NAME.first, NAME.second
 ///   objects with state(Archive&), pairs, other std::array             NAME.MEMBER, NAME.first and NAME.second, NAME[k]
@@ -217,6 +227,9 @@ class Archive {
     } else if constexpr (std::same_as<T, std::string>) {
       value.resize(self().begin(text_, value.size()));
       self().copy(value.data(), value.size());
+    } else if constexpr (archive::LongEigen<T>) {
+      value.resize(static_cast<typename T::Index>(self().begin(element_of<typename T::Scalar>, static_cast<std::size_t>(value.size()))));
+      self().copy(value.data(), static_cast<std::size_t>(value.size()) * sizeof(typename T::Scalar));
     } else if constexpr (archive::is_pair<T>) {
       named("first", value.first);
       named("second", value.second);

@@ -120,6 +120,20 @@ Table Table::from_text(std::string_view text, const std::string& name) {
   return Table(std::move(document), root, "");
 }
 
+std::string Table::canonical(const std::vector<std::string>& but) const {
+  auto root = document_->root;
+  for (const auto& path : but) {
+    auto* table = &root;
+    std::size_t begin = 0;
+    for (auto dot = path.find('.'); table && dot != std::string::npos; begin = dot + 1, dot = path.find('.', begin))
+      table = (*table)[path.substr(begin, dot - begin)].as_table();
+    if (table) table->erase(path.substr(begin));
+  }
+  std::stringstream text;
+  text << toml::json_formatter(root);
+  return text.str();
+}
+
 const std::string& Table::file() const { return document_->file; }
 
 std::string Table::folder() const {

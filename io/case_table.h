@@ -99,6 +99,8 @@ class Table {
   [[noreturn]] void fail(std::string_view key, const std::string& sentence) const;
   /// The same, located at the heading of this table.
   [[noreturn]] void fail(const std::string& sentence) const;
+  /// What the case says, but for the order of keys, comments, and the keys `but` (dotted paths): equal texts say the same.
+  std::string canonical(const std::vector<std::string>& but) const;
   const std::string& file() const;    ///< path of the case file as given
   std::string folder() const;         ///< absolute folder of the case file
 

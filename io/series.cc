@@ -98,6 +98,33 @@ struct SeriesWriter::File {
     if (H5Dwrite(target.data.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, values) < 0) fail(name);
   }
 
+  // What grows with the windows has no last extent; the rest, meshes, stays.
+  void cut(std::size_t to) {
+    std::vector<std::string> names;
+    const auto collect = [](hid_t, const char* name, const H5O_info_t* info, void* all) -> herr_t {
+      if (info->type == H5O_TYPE_DATASET) static_cast<std::vector<std::string>*>(all)->push_back(std::string("/") + name);
+      return 0;
+    };
+    if (H5Ovisit2(file.get(), H5_INDEX_NAME, H5_ITER_INC, collect, &names, H5O_INFO_BASIC) < 0) fail("the file");
+    for (const auto& name : names) {
+      Handle data(H5Dopen2(file.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+      const Handle space(H5Dget_space(data.get()), H5Sclose);
+      const auto rank = static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space.get())));
+      std::vector<hsize_t> size(rank), limit(rank);
+      H5Sget_simple_extent_dims(space.get(), size.data(), limit.data());
+      if (rank == 0 || limit[0] != H5S_UNLIMITED) continue;
+      if (name == "/windows" && size[0] < to)
+        throw UserError({path, 0, 0}, fmt::format("the record holds {} windows and the checkpoint was written after {}: they are not of one run. "
+                                                  "Start the run from its beginning.", size[0], to));
+      if (size[0] > to) {
+        size[0] = to;
+        if (H5Dset_extent(data.get(), size.data()) < 0) fail(name);
+      }
+      datasets.emplace(name, Appendable{std::move(data), size});
+    }
+    windows = to;
+  }
+
   template <class T>
   void write_once(const std::string& name, hid_t stored, hid_t given, const std::vector<hsize_t>& size, const T* values) {
     const Handle space(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), H5Sclose);
@@ -116,9 +143,19 @@ SeriesWriter::SeriesWriter(const std::string& path) : file_(std::make_unique<Fil
   if (!file_->file.valid()) file_->fail("the file");
 }
 
+SeriesWriter::SeriesWriter(const std::string& path, std::size_t windows) : file_(std::make_unique<File>()) {
+  silence();
+  file_->path = path;
+  file_->file = Handle(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
+  if (!file_->file.valid())
+    throw UserError({path, 0, 0}, "the record cannot be opened to go on with it: it is missing, damaged, or another program has it open. Start the run from its beginning.");
+  file_->cut(windows);
+}
+
 SeriesWriter::~SeriesWriter() = default;
 
 void SeriesWriter::add_surface(const std::string& name, const geometry::SurfaceMesh& mesh) {
+  if (H5Lexists(file_->file.get(), ("/" + name).c_str(), H5P_DEFAULT) > 0) return;
   std::vector<double> points;
   for (const auto& point : mesh.points) points.insert(points.end(), point.data(), point.data() + 3);
   file_->write_once(fmt::format("/{}/points", name), H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, {mesh.points.size(), 3},

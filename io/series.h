@@ -20,11 +20,13 @@ namespace acopla::io {
 class SeriesWriter {
  public:
   explicit SeriesWriter(const std::string& path);
+  /// Goes on with a file after its first `windows` windows; what came later is cut off.
+  SeriesWriter(const std::string& path, std::size_t windows);
   ~SeriesWriter();
   SeriesWriter(const SeriesWriter&) = delete;
   SeriesWriter& operator=(const SeriesWriter&) = delete;
 
-  void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);
+  void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);  ///< unless the file has it already
   /// Appends the field's values of the window begun last; one vector per point of the surface.
   void add_field(const std::string& surface, const std::string& field, std::span<const geometry::Vec3> values);
   /// Appends one scalar of the window begun last, e.g. "ledger/force_loss".

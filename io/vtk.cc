@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -92,6 +94,19 @@ void write_surface(const std::string& path, const geometry::SurfaceMesh& mesh, c
   }
   const bool lines = mesh.face_count() > 0 && geometry::corners_of(mesh.kind(0)) == 2;  // two dimensions
   write_poly_data(path, mesh.points, data, lines ? "Lines" : "Polys", nodes, offsets);
+}
+
+// Only what add() writes is read: one file a line.
+void PvdSeries::keep_until(double time) {
+  files_.clear();
+  std::ifstream list(path_);
+  const auto folder = std::filesystem::absolute(path_).parent_path();
+  for (std::string line; std::getline(list, line);) {
+    double when = 0;
+    std::array<char, 1024> name{};
+    if (std::sscanf(line.c_str(), "<DataSet timestep=\"%lf\" file=\"%1023[^\"]\"", &when, name.data()) == 2 && when <= time * (1 + 1e-10))
+      files_.emplace_back(when, (folder / name.data()).string());
+  }
 }
 
 void PvdSeries::add(double time, const std::string& file) {

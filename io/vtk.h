@@ -31,6 +31,8 @@ class PvdSeries {
   /// @param path  of the .pvd file; files are named relative to its folder
   explicit PvdSeries(std::string path) : path_(std::move(path)) {}
   void add(double time, const std::string& file);
+  /// Goes on with the list that a run before left: the files until `time` [s] stay in it.
+  void keep_until(double time);
 
  private:
   std::string path_;

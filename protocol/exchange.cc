@@ -99,6 +99,7 @@ Message welcome_message(const Run& run, const std::string& pulse_endpoint) {
   message.body = {{"tick", run.tick},       {"end", run.end},         {"window", run.window},
                   {"gravity", run.gravity}, {"results", run.results}, {"uses", uses},
                   {"pulse", pulse_endpoint}};
+  if (run.resumes) message.body["resumes"] = true;
   return message;
 }
 
@@ -118,8 +119,18 @@ Welcome read_welcome(const Message& message) {
                                 value<std::vector<std::string>>(message, use, "receives"),
                                 value<std::vector<std::string>>(message, use, "sends")});
   welcome.pulse_endpoint = value<std::string>(message, body, "pulse");
+  welcome.run.resumes = body.contains("resumes") && value<bool>(message, body, "resumes");
   return welcome;
 }
+
+Message folder_message(Kind kind, const std::string& folder) {
+  Message message;
+  message.kind = kind;
+  message.body = {{"folder", folder}};
+  return message;
+}
+
+std::string read_folder(const Message& message) { return value<std::string>(message, message.body, "folder"); }
 
 Message interface_message(const std::vector<Surface>& surfaces) {
   Message message;

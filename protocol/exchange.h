@@ -23,6 +23,10 @@ Welcome read_welcome(const Message& message);
 Message interface_message(const std::vector<Surface>& surfaces);
 std::vector<Surface> read_interface(const Message& message);
 
+/// `checkpoint` or `resume`.
+Message folder_message(Kind kind, const std::string& folder);
+std::string read_folder(const Message& message);
+
 Message advance_message(const Window& window, const std::vector<Field>& fields);
 struct AdvanceRequest {
   std::int64_t start = 0, end = 0;

@@ -32,6 +32,8 @@ struct Run {
     std::vector<std::string> sends;     ///< fields the solver must give, e.g. "displacement"
   };
   std::vector<Use> uses;
+  /// A call of resume() follows start(): what it brings, particles that settle or an equilibrium, need not be made first.
+  bool resumes = false;
   double time(std::int64_t ticks) const { return static_cast<double>(ticks) * tick; }
 };
 
@@ -89,6 +91,12 @@ class Participant {
   /// Remember / return to the present state (implicit coupling). Default: not supported.
   virtual void save();
   virtual void restore();
+
+  /// Writes everything that the run needs to go on bit by bit into files of an existing folder, which begin with the participant's name.
+  /// Nothing of what follows changes by it. Default: not supported.
+  virtual void checkpoint(const std::string& folder);
+  /// Right after start() of the same case: goes on from such files, and cuts its lists of results to that instant. Default: not supported.
+  virtual void resume(const std::string& folder);
 };
 
 /// A solver was asked for something it did not list among its capabilities.

@@ -107,7 +107,13 @@ class Session {
         state_ = "finishing";
         return done_message(with_peak(participant_.finish()));
       case Kind::checkpoint:
-      case Kind::resume: throw Unsupported(fmt::format("this solver cannot {}", name_of(request.kind)));
+        state_ = "writing a checkpoint";
+        participant_.checkpoint(read_folder(request));
+        return done_message();
+      case Kind::resume:
+        state_ = "resuming from a checkpoint";
+        participant_.resume(read_folder(request));
+        return done_message();
       default: out_of_turn(request);
     }
   }

@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "io/archive.h"
+
 namespace acopla::coupler {
 
 /// One iteration asks the participants for x̃ = H(x): the interface's motion that follows from the forces that follow from the motion x.
@@ -20,6 +22,9 @@ class Acceleration {
   virtual Vector next(const Vector& x, const Vector& answered) = 0;
   /// The window is accepted.
   virtual void end_window() {}
+  /// Between two windows: what it knows.
+  virtual void write(io::StateWriter&) {}
+  virtual void read(io::StateReader&) {}
 };
 
 enum class AccelerationKind { constant, aitken, iqn_ils };
@@ -50,6 +55,8 @@ class Aitken final : public Acceleration {
   explicit Aitken(double relaxation) : first_(relaxation), relaxation_(relaxation) {}
   void begin_window() override;
   Vector next(const Vector& x, const Vector& answered) override;
+  void write(io::StateWriter& writer) override { writer("relaxation", relaxation_); }
+  void read(io::StateReader& reader) override { reader("relaxation", relaxation_); }
 
  private:
   double first_, relaxation_;
@@ -67,9 +74,17 @@ class InterfaceQuasiNewton final : public Acceleration {
   void begin_window() override;
   Vector next(const Vector& x, const Vector& answered) override;
   void end_window() override;
+  void write(io::StateWriter& writer) override { state(writer); }
+  void read(io::StateReader& reader) override { state(reader); }
   std::size_t columns() const { return residuals_.size(); }
 
  private:
+  template <class Archive>
+  void state(Archive& archive) {
+    archive("residuals", residuals_);
+    archive("answers", answers_);
+    archive("ages", ages_);
+  }
   void forget();
   void drop(std::size_t column);
 

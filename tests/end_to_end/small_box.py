@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -124,6 +125,37 @@ class SmallBox(unittest.TestCase):
             # The structure's own arithmetic runs on threads: equal to round-off.
             a, b = first["quantities/structure.reaction.z"][...], second["quantities/structure.reaction.z"][...]
             self.assertLess(abs(a - b).max(), 1e-12 * abs(a).max())
+
+    def test_a_run_that_was_killed_is_resumed_bit_by_bit(self):
+        import h5py
+        # One thread each: a structure's sums on several threads agree to round-off only.
+        alone = {"OPENBLAS_NUM_THREADS": "1", "DEAL_II_NUM_THREADS": "1"}
+        case = self.write(('scheme = "one-way"\nwindow = 0.05', 'scheme = "explicit"\nwindow = 1e-4\ncheckpoint_every = 0.03\noutput_every = 0.05'), ("end = 1.0", "end = 0.15"),
+                          ('mesh = "box.msh"', 'mesh = "box.msh"\nanalysis = "dynamic"\nrayleigh = { mass = 10 }\noutput = { every = 0.05 }'),
+                          ("young = 2.1e11", "young = 1e8\ndensity = 8000"),
+                          text=CASE[:CASE.index("[expect]")])
+        with unittest.mock.patch.dict(os.environ, alone):
+            code, text = self.acopla("run", case, "--results", "whole")
+            self.assertEqual(code, 0, text)
+            process = subprocess.Popen([BIN / "acopla", "run", case, "--results", "killed"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.folder)
+            deadline = time.time() + 60
+            while not (self.folder / "killed/checkpoint/coupler.h5").exists() and time.time() < deadline:
+                time.sleep(0.01)
+            time.sleep(0.02)  # into the windows that will be computed again
+            process.kill()
+            process.wait()
+            code, text = self.acopla("run", case, "--resume", "killed")
+        self.assertEqual(code, 0, text)
+        compared = []
+        with h5py.File(self.folder / "whole/interface.h5") as whole, h5py.File(self.folder / "killed/interface.h5") as resumed:
+            def compare(name, data):
+                if isinstance(data, h5py.Dataset):
+                    self.assertEqual(data[...].tobytes(), resumed[name][...].tobytes(), name)
+                    compared.append(name)
+            whole.visititems(compare)
+        self.assertIn("structure.inside/force", compared)
+        for series in ("grains.box.pvd", "structure/structure.pvd", "grains/grains.pvd"):
+            self.assertEqual((self.folder / "whole" / series).read_text(), (self.folder / "killed" / series).read_text(), series)
 
     def test_first_line_comes_at_once(self):
         process = subprocess.Popen([BIN / "acopla", "run", self.write(), "--results", "out"], stdout=subprocess.PIPE, text=True, cwd=self.folder)

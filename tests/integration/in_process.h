@@ -44,8 +44,9 @@ struct Named {
 };
 
 /// Runs a case with these participants, each in a thread. What one of them throws is in the outcome, as the coupler heard it.
-/// @param endpoint  of its own for every run. @throws io::UserError of the case
-inline coupler::Outcome run(const std::string& text, const std::vector<Named>& participants, const std::string& endpoint, Door& door) {
+/// @param endpoint  of its own for every run. @param results  empty: none. @param resumes  from the checkpoint there. @throws io::UserError of the case
+inline coupler::Outcome run(const std::string& text, const std::vector<Named>& participants, const std::string& endpoint, Door& door,
+                            const std::string& results = {}, bool resumes = false) {
   const auto read = coupler::read_case(io::Table::from_text(text, "case.toml"));
   zmq::context_t context;
   std::vector<std::thread> threads;
@@ -61,7 +62,7 @@ inline coupler::Outcome run(const std::string& text, const std::vector<Named>& p
     for (auto& thread : threads) thread.join();
   };
   try {
-    auto outcome = coupler::Coupler(context, read, {endpoint, ""}, door).run();
+    auto outcome = coupler::Coupler(context, read, {endpoint, results, nullptr, resumes}, door).run();
     join();
     return outcome;
   } catch (...) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <vector>
 
@@ -27,8 +28,17 @@ inline const std::vector<Vec3>* field(const std::vector<protocol::Field>& fields
   return nullptr;
 }
 
+/// Place and speed, bit by bit.
+inline void write(const std::string& path, double u, double v) { std::ofstream(path) << std::hexfloat << u << ' ' << v; }
+inline void read(const std::string& path, double& u, double& v) {
+  std::ifstream file(path);
+  std::string first, second;
+  file >> first >> second;
+  u = std::stod(first), v = std::stod(second);
+}
+
 /// Mass 1. As particles do, it takes many steps in a window, and follows the surface of the other where it is told that it moves.
-class Loader final : public protocol::Participant {
+class Loader : public protocol::Participant {
  public:
   int steps = 32;              ///< of the classic Runge–Kutta method in a window: exact beside the coupling's error
   double stiffness = middle_spring, wall = wall_spring, own_mass = mass;
@@ -37,7 +47,7 @@ class Loader final : public protocol::Participant {
   double gap = 0;              ///< [m], of the contact
   double u = 1, v = 0;         ///< [m], [m/s]
 
-  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save"}}; }
+  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save", "checkpoint"}}; }
   std::vector<protocol::Surface> start(const protocol::Run&) override {
     geometry::SurfaceMesh mesh;
     mesh.points.emplace_back(1.0 / 3, 1.0 / 3, 0);
@@ -86,6 +96,8 @@ class Loader final : public protocol::Participant {
     u = saved_[0], v = saved_[1];
     history.resize(static_cast<std::size_t>(saved_[2]));
   }
+  void checkpoint(const std::string& folder) override { write(folder + "/first.txt", u, v); }
+  void resume(const std::string& folder) override { read(folder + "/first.txt", u, v); }
 
   std::vector<double> history;  ///< u at the end of each window
 
@@ -94,12 +106,12 @@ class Loader final : public protocol::Participant {
 };
 
 /// Mass 2: the trapezoidal rule under the mean force of the window, its acceleration anew from that force.
-class Structure final : public protocol::Participant {
+class Structure : public protocol::Participant {
  public:
   double u = 0, v = 0, own_mass = mass, wall = wall_spring;
   bool knows_its_mass = false;  ///< and says it, so that the coupler can judge
 
-  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save"}}; }
+  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save", "checkpoint"}}; }
   std::vector<protocol::Surface> start(const protocol::Run&) override {
     geometry::SurfaceMesh mesh;
     mesh.points = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
@@ -131,6 +143,8 @@ class Structure final : public protocol::Participant {
     history.resize(static_cast<std::size_t>(saved_[2]));
     velocities.resize(history.size());
   }
+  void checkpoint(const std::string& folder) override { write(folder + "/second.txt", u, v); }
+  void resume(const std::string& folder) override { read(folder + "/second.txt", u, v); }
 
   std::vector<double> history, velocities;  ///< at the end of each window
 

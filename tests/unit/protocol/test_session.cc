@@ -59,6 +59,7 @@ class Session : public ::testing::Test {
   void say(Kind kind, std::uint64_t sequence = 1) {
     Message message;
     message.kind = kind;
+    if (kind == Kind::checkpoint || kind == Kind::resume) message = folder_message(kind, "/tmp");
     message.sequence = sequence;
     hub_.send(peer_, message);
   }
