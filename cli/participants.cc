@@ -51,7 +51,7 @@ std::string solver_path(const coupler::ParticipantCase& participant) {
 Command command_of(const coupler::ParticipantCase& participant, const std::string& case_file,
                    const std::string& endpoint) {
   Command command;
-  const auto full = fs::absolute(case_file).lexically_normal();
+  const auto full = case_file.empty() ? fs::path() : fs::absolute(case_file).lexically_normal();
   command.environment = {{"ACOPLA_ENDPOINT", endpoint},
                          {"ACOPLA_PARTICIPANT", participant.name},
                          {"ACOPLA_CASE", full.string()}};

@@ -22,6 +22,9 @@
 
 namespace acopla::coupler {
 
+/// What the case couples of a participant's surfaces, as its welcome says it.
+std::vector<protocol::Run::Use> uses_of(const Case& read, const std::string& participant);
+
 /// The coupler's half of the state machine (docs/protocol.md, §3). Whatever a participant does
 /// wrong, and whatever befalls it, ends in a Failure that names it and its state; whatever a
 /// stranger does is answered and noted.

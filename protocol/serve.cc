@@ -4,6 +4,7 @@
 
 #include <sys/resource.h>
 
+#include <map>
 #include <optional>
 
 #include "io/error.h"
@@ -35,7 +36,9 @@ class Session {
     try {
       introduce();
       state_ = "starting";
-      channel_.send(interface_message(participant_.start(run_)));
+      const auto surfaces = participant_.start(run_);
+      for (const auto& surface : surfaces) points_[surface.name] = surface.mesh.points.size();
+      channel_.send(interface_message(surfaces));
       state_ = "ready";
       while (answer(next_request())) {
       }
@@ -96,7 +99,8 @@ class Session {
   Message compute(const Message& request) {
     switch (request.kind) {
       case Kind::advance: {
-        auto asked = read_advance(request);
+        const auto asked = read_advance(request, run_.uses);
+        check_points(asked.fields);
         state_ = fmt::format("advancing from {:.6g} s to {:.6g} s", run_.time(asked.start), run_.time(asked.end));
         const Window window{asked.start, asked.end, run_.time(asked.start), run_.time(asked.end - asked.start), asked.estimate};
         return advanced_message(participant_.advance(window, asked.fields));
@@ -118,6 +122,14 @@ class Session {
     }
   }
 
+  void check_points(const std::vector<Field>& fields) const {
+    for (const auto& field : fields) {
+      const auto known = points_.find(field.surface);
+      if (known != points_.end() && field.values.size() != known->second)
+        throw ProtocolError(fmt::format("{} on {} came with {} values for {} points", field.name, field.surface, field.values.size(), known->second));
+    }
+  }
+
   [[noreturn]] void out_of_turn(const Message& message) const {
     throw ProtocolError(fmt::format("the coupler sent {} to {} while it was {}", name_of(message.kind), options_.name, state_));
   }
@@ -136,6 +148,7 @@ class Session {
   Channel channel_;
   std::optional<Pulse> pulse_;
   Run run_;
+  std::map<std::string, std::size_t> points_;  // of the surfaces that were offered
   std::string state_ = "connected";
   bool coupler_knows_ = false;
 };

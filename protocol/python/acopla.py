@@ -67,6 +67,7 @@ class Run:
     gravity: numpy.ndarray  # [m/s²]
     results: str    # folder for own results, to be made when needed; empty: write none
     uses: list      # of Use; other surfaces need not be computed or sent
+    resumes: bool = False  # resume() follows start(): what it brings need not be made first
 
     def time(self, ticks):
         return ticks * self.tick
@@ -132,10 +133,12 @@ class Participant:
         raise Unsupported("this solver cannot restore its state")
 
     def checkpoint(self, folder):
-        raise Unsupported("this solver cannot checkpoint")
+        """Writes what the run needs to go on bit by bit into files of the folder that begin with the participant's name."""
+        raise Unsupported("this solver cannot write a checkpoint")
 
     def resume(self, folder):
-        raise Unsupported("this solver cannot resume")
+        """Right after start() of the same case: goes on from such files."""
+        raise Unsupported("this solver cannot resume from a checkpoint")
 
     def capabilities(self):
         kind = type(self)
@@ -300,7 +303,8 @@ def read_welcome(message):
         if not isinstance(use, dict):
             raise ProtocolError("\"uses\" of welcome is of the wrong type")
         uses.append(Use(_value(message, "surface", str, use), _texts(message, "receives", use), _texts(message, "sends", use)))
-    run = Run(tick, _value(message, "end", int), _value(message, "window", int), numpy.array(gravity, float), _value(message, "results", str), uses)
+    run = Run(tick, _value(message, "end", int), _value(message, "window", int), numpy.array(gravity, float), _value(message, "results", str), uses,
+              bool(message.body.get("resumes", False)))
     return run, _value(message, "pulse", str)
 
 
@@ -448,6 +452,7 @@ class _Session:
             getattr(self._participant, request.kind)()
             return Message("done", _values({}))
         if request.kind in ("checkpoint", "resume"):
+            self._state = "writing a checkpoint" if request.kind == "checkpoint" else "resuming from a checkpoint"
             getattr(self._participant, request.kind)(_value(request, "folder", str))
             return Message("done", _values({}))
         if request.kind == "finish":
@@ -463,7 +468,9 @@ class _Session:
         time_of = self._run.time
         window = Window(start, end, time_of(start), time_of(end - start), bool(request.body.get("estimate", False)))
         self._state = f"advancing from {time_of(start):.6g} s to {time_of(end):.6g} s"
-        received = {(array.mesh, array.name): self._field(array.mesh, array.name, array.values) for array in request.arrays}
+        wanted = {(use.surface, name) for use in self._run.uses for name in use.receives}
+        received = {(array.mesh, array.name): self._field(array.mesh, array.name, array.values) for array in request.arrays
+                    if (array.mesh, array.name) in wanted}  # other arrays are of a later release
         result = self._participant.advance(window, received)
         if not isinstance(result, Advance):
             result = Advance(result or {})
