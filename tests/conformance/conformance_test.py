@@ -110,7 +110,7 @@ analysis = "dynamic"
 young = 1e7
 poisson = 0.3
 density = 1000
-[structure.fix.left]
+[structure.fix.edges]
 """
 STL = "solid floor\n" + "".join(
     "facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {x} {y} 0\n" for x, y in triangle) + "endloop\nendfacet\n"
