@@ -9,6 +9,7 @@
 #include "cli/inspect.h"
 #include "cli/run.h"
 #include "io/error.h"
+#include "protocol/keys.h"
 
 namespace acopla::cli {
 namespace {
@@ -44,6 +45,13 @@ CLI::App* declare_replay(CLI::App& app, Arguments& arguments) {
   replay->add_option("--to", arguments.to, "its end [s] (default: the record's)");
   replay->add_option("--at", arguments.at, "time of this run at which it starts [s] (default 0)");
   return replay;
+}
+
+int keys(const std::string& folder) {
+  protocol::make_keys(folder);
+  fmt::print("{0}/coupler.keys: for `acopla-coupler --keys`, stays on its machine\n"
+             "{0}/participant.keys: copy it, secretly, to where participants run (--keys DIR, or ACOPLA_KEYS=DIR)\n", folder);
+  return io::exit_done;
 }
 
 CLI::App* declare_conformance(CLI::App& app, ConformanceOptions& options, bool& lists) {
@@ -88,6 +96,9 @@ int main_program(int argc, char** argv) {
   const bool examines = argc > 1 && std::string_view(argv[1]) == "conformance";
   const auto words = examines ? std::find(argv, argv + argc, std::string_view("--")) : argv + argc;
   if (words != argv + argc) examined.command.assign(words + 1, argv + argc);
+  std::string keys_folder;
+  auto* keys_command = app.add_subcommand("keys", "make the keys that open tcp beyond loopback: coupler.keys and participant.keys");
+  keys_command->add_option("folder", keys_folder, "folder to write them to")->required();
   try {
     app.parse(static_cast<int>(words - argv), argv);
   } catch (const CLI::ParseError& error) {
@@ -96,6 +107,7 @@ int main_program(int argc, char** argv) {
   if (*run_command) return run({arguments.case_file, arguments.results, std::nullopt, arguments.resume});
   if (*check_command) return check(arguments.case_file);
   if (*explain_command) return explain(arguments.case_file);
+  if (*keys_command) return keys(keys_folder);
   if (*conformance_command) return lists ? list_rules() : conformance(examined);
   if (*replay_command)
     return run({arguments.case_file, arguments.results,

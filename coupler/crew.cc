@@ -40,14 +40,15 @@ std::string printable(std::string text) {
 }  // namespace
 
 Crew::Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
-           const std::string& results, Reporter& reporter, Outside* outside, bool resumes)
+           const std::string& results, Reporter& reporter, Outside* outside, bool resumes,
+           const protocol::Keys* keys)
     : case_(read),
       results_(results),
       resumes_(resumes),
       reporter_(reporter),
       outside_(outside),
-      hub_(context, endpoint),
-      pulse_(context, pulse_endpoint(hub_.endpoint())),
+      hub_(context, endpoint, keys),
+      pulse_(context, pulse_endpoint(hub_.endpoint()), keys),
       begin_(Clock::now()) {
   for (const auto& participant : case_.participants) {
     auto& member = members_[participant.name];

@@ -33,7 +33,8 @@ class Crew {
   /// Binds the hub and the pulse. @param outside may be null. @throws io::UserError when the
   /// address is taken
   Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
-       const std::string& results, Reporter& reporter, Outside* outside, bool resumes = false);
+       const std::string& results, Reporter& reporter, Outside* outside, bool resumes = false,
+       const protocol::Keys* keys = nullptr);
 
   /// Waits until everybody said hello and sent its surfaces. @throws Failure, Interrupted
   void assemble();

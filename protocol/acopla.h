@@ -44,6 +44,7 @@ typedef struct acopla_options {
   int dimension;        /* 2 or 3; must be the case's */
   const char* endpoint; /* NULL: ACOPLA_ENDPOINT of the environment, which `acopla run` sets */
   const char* name;     /* NULL: ACOPLA_PARTICIPANT */
+  const char* keys;     /* folder with participant.keys, for tcp beyond loopback; NULL: ACOPLA_KEYS, or none */
   /* Remember the present state, and return to it as often as asked (implicit schemes); both or neither. */
   acopla_state_handler save, restore;
   /* Write files that begin with the participant's name into a folder, and go on from them; both or neither. */

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "protocol/acopla.h"
+#include "protocol/keys.h"
 #include "protocol/session.h"
 
 using namespace acopla;
@@ -106,6 +107,7 @@ acopla_participant* connect(const acopla_options& options) {
   protocol::ServeOptions where;
   where.endpoint = text_of(options.endpoint, "ACOPLA_ENDPOINT", "address");
   where.name = text_of(options.name, "ACOPLA_PARTICIPANT", "name");
+  where.keys = options.keys ? options.keys : protocol::keys_of_environment();
   return new acopla_participant(introduction, where, handlers_of(options));
 }
 

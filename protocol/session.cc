@@ -24,6 +24,13 @@ std::vector<std::pair<std::string, double>> with_peak(std::vector<std::pair<std:
   return values;
 }
 
+// A coupler that listens on every address of its machine does not know by which of them it is seen: the one that reached it will do.
+std::string reachable(const std::string& pulse, const std::string& hub) {
+  for (const std::string any : {"tcp://0.0.0.0:", "tcp://[::]:"})
+    if (pulse.starts_with(any)) return hub.substr(0, hub.rfind(':') + 1) + pulse.substr(any.size());
+  return pulse;
+}
+
 }  // namespace
 
 // The solver's half of the state machine (docs/protocol.md, §3): connected → introduced → started → ready ⇄ advancing →
@@ -35,14 +42,15 @@ class Session::Line {
         handlers_(std::move(handlers)),
         own_context_(options.context ? nullptr : new zmq::context_t),
         context_(options.context ? *options.context : *own_context_),
-        channel_(context_, options.endpoint) {
+        keys_(options.keys.empty() || !options.endpoint.starts_with("tcp://") ? std::nullopt : std::optional(read_participant_keys(options.keys))),
+        channel_(context_, options.endpoint, keys_ ? &*keys_ : nullptr) {
     reporting([&] {
       channel_.send(hello_message(options_.name, introduction));
       const auto message = next_request();
       if (message.kind != Kind::welcome) out_of_turn(message);
       auto welcome = read_welcome(message);
       run_ = std::move(welcome.run);
-      pulse_.emplace(context_, welcome.pulse_endpoint, options_.name);
+      pulse_.emplace(context_, reachable(welcome.pulse_endpoint, options_.endpoint), options_.name, keys_ ? &*keys_ : nullptr);
       state_ = "starting";
     });
   }
@@ -176,6 +184,7 @@ class Session::Line {
   const Handlers handlers_;
   std::unique_ptr<zmq::context_t> own_context_;
   zmq::context_t& context_;
+  std::optional<Keys> keys_;
   Channel channel_;
   std::optional<Pulse> pulse_;
   Run run_;

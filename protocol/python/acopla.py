@@ -336,8 +336,8 @@ class _Pulse:
     """Answers pings on a thread and a socket of its own, so that a long computation is not taken for death. (One that holds Python's
     interpreter lock for more than a second, as a few extension modules do, still is.)"""
 
-    def __init__(self, context, address, name):
-        self._socket = _dealer(context, address, linger=0)
+    def __init__(self, context, address, name, keys):
+        self._socket = _dealer(context, address, 0, keys)
         self._pong, self._stop, self._last_ping = encode(Message("pong", {"participant": name})), threading.Event(), time.monotonic()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -369,15 +369,38 @@ class _Pulse:
             pass  # no coupler: silence() will tell
 
 
-def _check_endpoint(endpoint):
-    if endpoint.startswith("tcp://") and endpoint[6:].rpartition(":")[0] not in ("127.0.0.1", "localhost", "[::1]"):
-        raise UserMistake(f"{endpoint}: tcp is open to loopback only, because messages are neither signed nor encrypted. "
-                          "Use tcp://127.0.0.1:PORT.")
+def _check_endpoint(endpoint, keys=None):
+    if not keys and endpoint.startswith("tcp://") and endpoint[6:].rpartition(":")[0] not in ("127.0.0.1", "localhost", "[::1]"):
+        raise UserMistake(f"{endpoint}: tcp is open to loopback only, because messages are neither signed nor encrypted "
+                          "without keys. Use tcp://127.0.0.1:PORT, or make keys by `acopla keys DIR` and give them to both sides (ACOPLA_KEYS=DIR).")
 
 
-def _dealer(context, address, linger):
-    _check_endpoint(address)
+def read_keys(folder):
+    """The participants' CURVE keys that `acopla keys` made: public, secret, and the coupler's public."""
+    path = os.path.join(folder, "participant.keys")
+    try:
+        if os.stat(path).st_mode & 0o077:
+            raise UserMistake(f"{path}: may be read by others. Use chmod 600 {path}, and make new keys if others did.")
+        with open(path) as stream:
+            entries = dict(line.split() for line in stream if not line.startswith("#") and len(line.split()) == 2)
+        return tuple(entries[word].encode() for word in ("public", "secret", "other"))
+    except (OSError, KeyError) as error:
+        raise UserMistake(f"{path}: cannot be read ({error}). Make keys by `acopla keys DIR`, and copy participant.keys to here.") from None
+
+
+def _reachable(pulse, hub):
+    """A coupler that listens on every address of its machine does not know by which it is seen: the one that reached it will do."""
+    for anywhere in ("tcp://0.0.0.0:", "tcp://[::]:"):
+        if pulse.startswith(anywhere):
+            return hub[:hub.rindex(":") + 1] + pulse[len(anywhere):]
+    return pulse
+
+
+def _dealer(context, address, linger, keys):
+    _check_endpoint(address, keys)
     socket = context.socket(zmq.DEALER)
+    if keys and address.startswith("tcp://"):
+        socket.curve_publickey, socket.curve_secretkey, socket.curve_serverkey = keys
     socket.setsockopt(zmq.LINGER, linger)
     socket.setsockopt(zmq.SNDTIMEO, SEND_LIMIT)
     socket.setsockopt(zmq.RECONNECT_IVL, 20)
@@ -390,9 +413,10 @@ def _dealer(context, address, linger):
 class _Session:
     """The solver's half of the state machine (docs/protocol.md, §3)."""
 
-    def __init__(self, participant, endpoint, name, context):
+    def __init__(self, participant, endpoint, name, keys, context):
         self._participant, self._endpoint, self._name, self._context = participant, endpoint, name, context
-        self._socket, self._pulse, self._state, self._coupler_knows = _dealer(context, endpoint, linger=2000), None, "connected", False
+        self._keys = read_keys(keys) if keys and endpoint.startswith("tcp://") else None
+        self._socket, self._pulse, self._state, self._coupler_knows = _dealer(context, endpoint, 2000, self._keys), None, "connected", False
         self._begin = time.monotonic()
 
     def run(self):
@@ -421,7 +445,7 @@ class _Session:
         if message.kind != "welcome":
             self._refuse(message)
         self._run, address = read_welcome(message)
-        self._pulse = _Pulse(self._context, address, self._name)
+        self._pulse = _Pulse(self._context, _reachable(address, self._endpoint), self._name, self._keys)
 
     def _next_request(self):
         begin = time.monotonic()
@@ -508,9 +532,10 @@ def own_table():
         return tomllib.load(stream)[os.environ["ACOPLA_PARTICIPANT"]]
 
 
-def serve(participant, endpoint=None, name=None):
+def serve(participant, endpoint=None, name=None, keys=None):
     """Serves the participant until the coupler says finish. An exception of the participant reaches the user, with its words, before it
-    leaves this function. Without an address and a name they are those that `acopla run` gave in the environment."""
+    leaves this function. Without an address and a name they are those that `acopla run` gave in the environment. keys: the folder with
+    participant.keys, for tcp beyond loopback."""
     try:
         endpoint = endpoint or os.environ["ACOPLA_ENDPOINT"]
         name = name or os.environ["ACOPLA_PARTICIPANT"]
@@ -518,7 +543,7 @@ def serve(participant, endpoint=None, name=None):
         sys.exit(f"{missing.args[0]} is not set. This program is started by `acopla run`, as a case's command = […].")
     context = zmq.Context()
     try:
-        _Session(participant, endpoint, name, context).run()
+        _Session(participant, endpoint, name, keys or os.environ.get("ACOPLA_KEYS"), context).run()
     except UserMistake as mistake:
         print(mistake, file=sys.stderr)
         sys.exit(2)
