@@ -44,6 +44,12 @@ std::string loads_text(const coupler::Case& read) {
     case coupler::Loads::mean:
       return fmt::format("receivers get the mean from {:.6g} s to {:.6g} s, once",
                          read.time(read.load_start), read.time(read.load_end));
+    case coupler::Loads::running_mean:
+      return fmt::format("every window from {:.6g} s on is sent to the receivers, as the mean over the {:.6g} s before its end",
+                         read.time(read.loads_from), read.time(read.load_windows));
+    case coupler::Loads::peak:
+      return fmt::format("receivers get the largest force of each node from {:.6g} s to {:.6g} s, once",
+                         read.time(read.load_start), read.time(read.load_end));
     case coupler::Loads::snapshot:
       return fmt::format("receivers get the window that ends at {:.6g} s, once",
                          read.time(read.load_end));

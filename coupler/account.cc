@@ -12,24 +12,20 @@ namespace acopla::coupler {
 
 using geometry::Vec3;
 
-namespace {
-
-const std::vector<Vec3>& force_on(const protocol::Advance& advance, const std::string& surface) {
-  for (const auto& field : advance.fields)
-    if (field.surface == surface && field.name == "force") return field.values;
-  throw std::logic_error("a crew answer without its force");  // Crew refuses those
-}
-
-}  // namespace
-
 Account::Account(const Case& read, Crew& crew, Record& record, Quantities& quantities,
                  Reporter& reporter)
     : case_(read), crew_(crew), record_(record), quantities_(quantities), reporter_(reporter) {
   for (const auto& interface : case_.interfaces) link(interface);
+  for (auto& link : links_) {
+    link.centre = link.from->centroid();
+    for (const auto& other : links_) link.alone = link.alone && (&other == &link || !other.mapping || !(other.about->to == link.about->to));
+  }
 }
 
 void Account::link(const InterfaceCase& interface) {
-  Link link{&interface, &crew_.surface(interface.from, interface.from_at), nullptr, nullptr};
+  Link link;
+  link.about = &interface;
+  link.from = &crew_.surface(interface.from, interface.from_at);
   if (interface.recorded_only()) {
     record_.add_surface(interface.from.text(), *link.from);
     record_.set_mapping(links_.size(), 0, 0);
@@ -65,30 +61,41 @@ void Account::link(const InterfaceCase& interface) {
   links_.push_back(std::move(link));
 }
 
-void Account::map_forces(const std::string& sender, const protocol::Advance& advance,
-                         WindowRecord& window,
-                         std::map<std::string, std::vector<Vec3>>& received) const {
+void Account::map_forces(const std::string& sender, protocol::Advance& advance, WindowRecord& window, Forces& received) const {
+  for (auto& field : advance.fields)
+    if (field.name == "force") window.forces[sender + "." + field.surface] = std::move(field.values);
+  for (std::size_t k = 0; k < links_.size(); ++k) {
+    const auto& link = links_[k];
+    if (!link.mapping || link.about->from.participant != sender) continue;
+    const auto& sent = window.forces.at(link.about->from.text());
+    auto& load = received[link.about->to.text()];
+    if (link.alone) {
+      load.resize(link.to->points.size());
+      link.mapping->forces(sent, load);
+      continue;
+    }
+    window.arrived.resize(links_.size());
+    auto& part = window.arrived[k];
+    part.resize(link.to->points.size());
+    link.mapping->forces(sent, part);
+    if (load.empty()) load.assign(part.size(), Vec3::Zero());
+    for (std::size_t n = 0; n < part.size(); ++n) load[n] += part[n];
+  }
+}
+
+const std::vector<Vec3>& Account::arrived(std::size_t interface, const WindowRecord& window, const Forces& received) const {
+  return links_[interface].alone ? received.at(links_[interface].about->to.text()) : window.arrived[interface];
+}
+
+void Account::balance(const std::string& sender, WindowRecord& window, const Forces& received) const {
   window.ledger.resize(links_.size());
   for (std::size_t k = 0; k < links_.size(); ++k) {
     const auto& link = links_[k];
     if (link.about->from.participant != sender) continue;
-    const auto& sent = force_on(advance, link.about->from.surface);
-    window.forces[link.about->from.text()] = sent;
-    const Vec3 centre = link.from->centroid();
     auto& row = window.ledger[k];
-    row.sent = resultant(link.from->points, sent, centre);
-    if (!link.mapping) {
-      row.received = row.sent;
-      continue;
-    }
-    std::vector<Vec3> arrived(link.to->points.size());
-    link.mapping->forces(sent, arrived);
-    row.received = resultant(link.to->points, arrived, centre);
-    row.loss = loss(row.sent, row.received);
-    // Several interfaces may end on one surface.
-    auto& load = received[link.about->to.text()];
-    if (load.empty()) load.assign(arrived.size(), Vec3::Zero());
-    for (std::size_t n = 0; n < arrived.size(); ++n) load[n] += arrived[n];
+    row.sent = resultant(link.from->points, window.forces.at(link.about->from.text()), link.centre);
+    row.received = link.mapping ? resultant(link.to->points, arrived(k, window, received), link.centre) : row.sent;
+    if (link.mapping) row.loss = loss(row.sent, row.received);
   }
 }
 
@@ -110,14 +117,14 @@ void Account::close(WindowRecord& window) {
   ledgers_.iterations += window.iterations;
   ledgers_.most_iterations = std::max(ledgers_.most_iterations, window.iterations);
   ledgers_.not_converged += window.converged ? 0 : 1;
+  ledgers_.jumped += window.jumped ? 1 : 0;
   window.energy_made = ledgers_.energy_made;
   record_.write(complete_, window);
   const double end = case_.time(complete_ + 1);
   for (const auto& [name, value] : window.quantities) quantities_.add(name, end, value);
   ++complete_;
-  const auto seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  reporter_.progress(complete_, case_.windows, end, seconds);
+  seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  reporter_.progress(complete_, case_.windows, end, seconds_);
   check_limits(window);
 }
 

@@ -19,9 +19,11 @@ namespace acopla::coupler {
 
 /// An interface with its surfaces and the mapping between them.
 struct Link {
-  const InterfaceCase* about;
-  const geometry::SurfaceMesh *from, *to;  ///< to, mapping: null where the forces are recorded only
+  const InterfaceCase* about = nullptr;
+  const geometry::SurfaceMesh *from = nullptr, *to = nullptr;  ///< to, mapping: null where the forces are recorded only
   std::unique_ptr<Mapping> mapping;
+  geometry::Vec3 centre = geometry::Vec3::Zero();  ///< of `from`, about which moments are taken [m]
+  bool alone = true;                               ///< no other interface ends on `to`
 };
 
 /// What every scheme keeps: it builds the mappings, and books each window once everybody is through it.
@@ -31,10 +33,14 @@ class Account {
   Account(const Case& read, Crew& crew, Record& record, Quantities& quantities, Reporter& reporter);
 
   const std::vector<Link>& links() const { return links_; }
-  /// Maps what `sender` sent in a window onto the surfaces that receive it, which grow by it, and enters
-  /// both sides in the record. @param received  "to" surface → one force per node [N]
-  void map_forces(const std::string& sender, const protocol::Advance& advance, WindowRecord& window,
-                  std::map<std::string, std::vector<geometry::Vec3>>& received) const;
+  using Forces = std::map<std::string, std::vector<geometry::Vec3>>;  // surface → one force per point [N]
+
+  /// Maps what `sender` sent in a window, which goes into the record, onto the surfaces that receive it, which grow by it.
+  void map_forces(const std::string& sender, protocol::Advance& advance, WindowRecord& window, Forces& received) const;
+  /// Enters in the ledger what went through the interfaces from `sender`, once all its forces are mapped: nobody need wait for it.
+  void balance(const std::string& sender, WindowRecord& window, const Forces& received) const;
+  /// The part of what arrived on a surface that came through one interface.
+  const std::vector<geometry::Vec3>& arrived(std::size_t interface, const WindowRecord& window, const Forces& received) const;
 
   void begin();  ///< computing begins
   void flush() { record_.flush(); }  ///< all windows are on disk
@@ -49,6 +55,7 @@ class Account {
   void close(WindowRecord& window);
 
   std::int64_t complete() const { return complete_; }  ///< windows written
+  double seconds() const { return seconds_; }          ///< from begin() to the last of them
   const Ledgers& ledgers() const { return ledgers_; }
   const std::vector<InterfaceOutcome>& interfaces() const { return interfaces_; }
 
@@ -66,6 +73,7 @@ class Account {
   Ledgers ledgers_;
   std::vector<InterfaceOutcome> interfaces_;
   std::chrono::steady_clock::time_point begin_;
+  double seconds_ = 0;
 };
 
 }  // namespace acopla::coupler

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 namespace acopla::coupler {
 namespace {
@@ -212,10 +213,9 @@ void read_loads(const io::Table& coupling, Case& read) {
         throw io::UserError(participant.at, fmt::format("{} is a record, which cannot answer with its motion. Use scheme = \"one-way\".", participant.name));
     return;
   }
-  const auto loads = coupling.choice("loads", {"history", "mean", "snapshot"}, "history");
-  read.loads = loads == "history" ? Loads::history
-               : loads == "mean"  ? Loads::mean
-                                  : Loads::snapshot;
+  static const std::map<std::string, Loads> known{{"history", Loads::history}, {"running_mean", Loads::running_mean}, {"mean", Loads::mean},
+                                                  {"snapshot", Loads::snapshot}, {"peak", Loads::peak}};
+  read.loads = known.at(coupling.choice("loads", {"history", "running_mean", "mean", "snapshot", "peak"}, "history"));
   const auto only_for = [&](const char* key, const char* which) {
     if (coupling.has(key))
       coupling.fail(key, fmt::format("has a meaning with loads = {} only. Remove it.", which));
@@ -226,28 +226,31 @@ void read_loads(const io::Table& coupling, Case& read) {
       if (coupling.has(key))
         coupling.fail(key,
                       "has no effect: no interface has a receiver. Add `to` to one, or remove it.");
-  if (read.loads == Loads::history) {
-    only_for("at", "\"mean\" or \"snapshot\"");
-    only_for("over", "\"mean\"");
+  const bool by_window = read.loads == Loads::history || read.loads == Loads::running_mean;
+  const auto windows_over = [&](double fallback) {
+    const auto over = whole_windows(coupling, "over", coupling.number("over", io::positive, fallback), read.window);
+    if (over < 1) coupling.fail("over", "must be at least a window.");
+    return over;
+  };
+  if (by_window) {
+    only_for("at", "\"mean\", \"snapshot\" or \"peak\"");
+    if (read.loads == Loads::history) only_for("over", "\"mean\", \"running_mean\" or \"peak\"");
+    else read.load_windows = windows_over(coupling.number("over", io::positive));
     const double from = coupling.number("loads_from", io::non_negative, 0);
     read.loads_from = static_cast<std::int64_t>(std::ceil(from / read.window - 1e-9));
     if (read.loads_from >= read.windows)
       coupling.fail("loads_from", "leaves no window to send. Choose a time before `end`.");
     return;
   }
-  only_for("loads_from", "\"history\"");
-  if (read.loads == Loads::snapshot) only_for("over", "\"mean\"");
+  only_for("loads_from", "\"history\" or \"running_mean\"");
+  if (read.loads == Loads::snapshot) only_for("over", "\"mean\", \"running_mean\" or \"peak\"");
   const double at = coupling.number("at", io::positive, read.end);
   if (at > read.end * (1 + 1e-12))
     coupling.fail("at", fmt::format("= {:.10g} s is after the end, {:.10g} s.", at, read.end));
   read.load_end = whole_windows(coupling, "at", at, read.window);
-  const auto over =
-      read.loads == Loads::mean
-          ? whole_windows(coupling, "over", coupling.number("over", io::positive, read.window),
-                          read.window)
-          : 1;
-  if (over < 1 || over > read.load_end)
-    coupling.fail("over", "must be at least a window and reach no further back than the start.");
+  // A mean is over one window unless more is asked for, a peak over all.
+  const auto over = read.loads == Loads::snapshot ? 1 : windows_over(read.loads == Loads::peak ? at : read.window);
+  if (over > read.load_end) coupling.fail("over", "reaches further back than the start.");
   read.load_start = read.load_end - over;
 }
 

@@ -62,7 +62,7 @@ struct ImplicitSettings {
   bool stops = true;           ///< where a window does not converge
 };
 
-enum class Loads { history, mean, snapshot };
+enum class Loads { history, running_mean, mean, snapshot, peak };  ///< load_filter.h
 
 struct LedgerLimits {
   double force_loss = 1e-12;
@@ -93,8 +93,9 @@ struct Case {
   bool allows_unstable = false;  ///< explicit schemes
   Loads loads = Loads::history;
   std::int64_t loads_from = 0;  ///< first window that receivers are given (history)
-  std::int64_t load_start = 0;  ///< windows [load_start, load_end) of a mean or snapshot
+  std::int64_t load_start = 0;  ///< windows [load_start, load_end) of a mean, peak or snapshot
   std::int64_t load_end = 0;
+  std::int64_t load_windows = 1;  ///< of a running mean
   double max_distance = 0;        ///< [m]
   double start_limit = 60;        ///< [s]
   std::int64_t output_every = 1;  ///< windows between pictures

@@ -92,6 +92,7 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
   if (stages.account) {
     outcome.windows = stages.account->complete();
     outcome.reached = outcome.windows == read.windows ? read.end : read.time(outcome.windows);
+    outcome.seconds_windows = stages.account->seconds();
     outcome.ledgers = stages.account->ledgers();
     outcome.interfaces = stages.account->interfaces();
   }

@@ -138,7 +138,7 @@ class Crew {
   std::map<std::string, Member> members_;
   std::deque<Answer> answers_;
   std::vector<std::pair<std::string, double>> last_values_;
-  Clock::time_point begin_;
+  Clock::time_point begin_, looked_;
   int notes_left_ = 50;  // a stranger must not fill the disk with our log
 };
 

@@ -46,10 +46,12 @@ Json summary_of(const Outcome& outcome) {
         {"iterations", outcome.ledgers.iterations},
         {"most_iterations", outcome.ledgers.most_iterations},
         {"not_converged", outcome.ledgers.not_converged},
+        {"jumped", outcome.ledgers.jumped},
         {"unmapped", outcome.ledgers.unmapped},
         {"worst_distance", outcome.ledgers.worst_distance}}},
       {"participants", participants_of(outcome)},
       {"seconds", outcome.seconds},
+      {"seconds_windows", outcome.seconds_windows},
       {"error", outcome.error ? Json{{"participant", outcome.error->participant},
                                      {"state", outcome.error->state},
                                      {"message", outcome.error->message}}

@@ -29,6 +29,7 @@ struct Ledgers {
   std::int64_t iterations = 0;       ///< of all windows
   std::int64_t most_iterations = 0;  ///< of one window
   std::int64_t not_converged = 0;    ///< windows that were accepted all the same
+  std::int64_t jumped = 0;           ///< windows that ended on one side of a jump of the forces
   std::int64_t unmapped = 0;
   double worst_distance = 0;  ///< [m]
 };
@@ -61,7 +62,8 @@ struct Outcome {
   std::vector<InterfaceOutcome> interfaces;
   std::vector<std::pair<std::string, double>>
       quantities;  ///< last value of each, "participant.quantity"
-  double seconds = 0;
+  double seconds = 0;          ///< of the run
+  double seconds_windows = 0;  ///< of its windows, without start and end
   struct Error {
     std::string participant, state, message;
   };

@@ -99,6 +99,7 @@ void Record::write_ledger(const WindowRecord& window) {
   if (case_.scheme != SchemeKind::serial_implicit) return;
   series_->add_scalar("ledger/iterations", static_cast<double>(window.iterations));
   series_->add_scalar("ledger/residual", window.residual);
+  series_->add_scalar("ledger/jumped", window.jumped ? 1 : 0);
 }
 
 void Record::write_picture(std::int64_t index, const std::string& surface,

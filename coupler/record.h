@@ -30,10 +30,12 @@ struct LedgerRow {
 struct WindowRecord {
   std::vector<LedgerRow> ledger;                              ///< one per interface of the case
   std::map<std::string, std::vector<geometry::Vec3>> forces;  ///< "grains.box" → one per point [N]
+  std::vector<std::vector<geometry::Vec3>> arrived;  ///< per interface, where several end on one surface: its part there [N]
   std::vector<std::pair<std::string, double>> quantities;     ///< "participant.quantity"
   std::int64_t iterations = 0;  ///< implicit
   double residual = 0;          ///< implicit: of the motion, over that of the window
   bool converged = true;
+  bool jumped = false;  ///< implicit: it ends on one side of a jump of the forces, the motion known within its tolerance
   double energy_made = 0;  ///< until the window's end [J]
 };
 

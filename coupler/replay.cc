@@ -78,6 +78,9 @@ protocol::Advance Replay::advance(const protocol::Window& window,
                             window.end_time() + shift);
     geometry::Vec3 sum = geometry::Vec3::Zero();
     for (const auto& f : force) sum += f;
+    if (!sum.allFinite())
+      throw io::UserError({replay_.file, 0, 0}, fmt::format("the record holds no force of {} between {:.6g} s and {:.6g} s. Choose another part of it.", surface.name,
+                                                            window.start_time + shift, window.end_time() + shift));
     for (int d = 0; d < 3; ++d)
       advance.quantities.emplace_back(fmt::format("{}.force.{}", surface.name, "xyz"[d]), sum[d]);
     advance.fields.push_back({surface.name, "force", std::move(force)});

@@ -20,8 +20,8 @@ double size_of(const std::vector<Vec3>& values) {
   return std::sqrt(square);
 }
 
-const std::vector<Vec3>& field_of(const protocol::Advance& advance, const std::string& surface, const char* name) {
-  for (const auto& field : advance.fields)
+std::vector<Vec3>& field_of(protocol::Advance& advance, const std::string& surface, const char* name) {
+  for (auto& field : advance.fields)
     if (field.surface == surface && field.name == name) return field.values;
   throw std::logic_error("a crew answer without a field that was asked for");  // Crew refuses those
 }
@@ -71,9 +71,9 @@ void TwoWay::state(Archive& archive) {
   if (case_.scheme == SchemeKind::parallel_explicit)
     for (const auto& link : account_.links()) {
       if (!link.mapping) continue;
-      archive("last." + link.about->text() + ".received", last_forces_[link.about->to.text()]);
-      archive("last." + link.about->text() + ".sent", last_sent_[link.about->from.text()]);
+      for (const auto& surface : {link.about->from.text(), link.about->to.text()}) archive("last." + link.about->text() + "." + surface, last_.forces[surface]);
     }
+  if (case_.scheme == SchemeKind::parallel_explicit) archive("last.arrived", last_.arrived);
   if (!acceleration_) return;
   if constexpr (Archive::reading) acceleration_->read(archive);
   else acceleration_->write(archive);
@@ -81,27 +81,34 @@ void TwoWay::state(Archive& archive) {
 template void TwoWay::state(io::StateWriter&);
 template void TwoWay::state(io::StateReader&);
 
+// Both sides compute while the books are kept: the structures while the forces are added up, and the loaders, in the next window already,
+// while this one is closed.
 void TwoWay::step_serially(WindowRecord& window) {
   Forces forces;
   Motions end;
-  begin_loaders(nullptr);
+  if (!begun_) begin_loaders(window_, nullptr);
   gather(loaders_.size(), window, forces, end);
-  begin_structures(forces);
-  gather(structures_.size(), window, forces, end);
-  book_work(window, window.forces, end, moved_on());
-  now_ = std::move(end);
+  begin_structures(std::move(forces));
+  balance(window);
+  Forces none;
+  gather(structures_.size(), window, none, end);
+  const auto start = std::exchange(now_, std::move(end));
+  begun_ = window_ + 1 < std::min(case_.windows, case_.next_checkpoint(window_));
+  if (begun_) begin_loaders(window_ + 1, nullptr);
+  book_work(window, window, start, moved_on(start), now_);
 }
 
 void TwoWay::step_in_parallel(WindowRecord& window) {
   Forces forces;
   Motions end;
-  begin_structures(last_forces_);
-  begin_loaders(nullptr);
+  begin_structures(last_.forces);
+  begin_loaders(window_, nullptr);
   gather(loaders_.size() + structures_.size(), window, forces, end);
-  book_work(window, last_sent_, end, moved_on());
+  balance(window);
+  book_work(window, last_, now_, moved_on(now_), end);
   now_ = std::move(end);
-  last_sent_ = window.forces;
-  last_forces_ = std::move(forces);
+  last_.forces = window.forces;
+  last_.arrived = window.arrived;
 }
 
 void TwoWay::step_with_iterations(WindowRecord& window) {
@@ -110,18 +117,20 @@ void TwoWay::step_with_iterations(WindowRecord& window) {
   everybody.insert(everybody.end(), structures_.begin(), structures_.end());
   crew_.save(everybody);
   acceleration_->begin_window();
-  auto assumed = flat(moved_on());
+  jump_.begin_window();
+  auto assumed = flat(moved_on(now_));
   const auto start = flat(now_);
   std::vector<double> residuals;
   double force_change = 0;
   Forces before;
+  bool settled = false;  // on one side of a jump
   for (int iteration = 1;; ++iteration) {
     if (iteration > 1) crew_.restore(everybody);
     window = {};
     Forces forces;
     Motions end;
     const auto moved_to = unflat(assumed);
-    begin_loaders(&moved_to);
+    begin_loaders(window_, &moved_to);
     gather(loaders_.size(), window, forces, end);
     begin_structures(forces);
     gather(structures_.size(), window, forces, end);
@@ -129,33 +138,44 @@ void TwoWay::step_with_iterations(WindowRecord& window) {
     const auto answered = flat(end);
 
     // Motion counts from the window's start, so that a tolerance means the same however far the structure has gone.
-    const double residual = (answered - assumed).norm(), moved = (answered - start).norm();
-    residuals.push_back(residual);
-    const bool motion_agrees = residual <= std::max(settings.relative * moved, settings.displacement);
-    bool forces_agree = true;
-    if (iteration > 1) {
-      double change = 0, size = 0;
-      for (const auto& [surface, values] : forces) {
-        Vectors difference = values;
-        for (std::size_t k = 0; k < values.size(); ++k) difference[k] -= before.at(surface)[k];
-        change = std::hypot(change, size_of(difference));
-        size = std::hypot(size, size_of(values));
-      }
-      force_change = size > 0 ? change / size : 0;
-      forces_agree = change <= std::max(settings.relative * size, settings.force);
-    }
-    window.residual = moved > 0 ? residual / moved : residual;
-    window.converged = motion_agrees && forces_agree;
-    if (!window.converged && iteration >= settings.most_iterations && settings.stops) give_up(residuals, force_change);
-    if (window.converged || iteration >= settings.most_iterations) {
+    const Eigen::VectorXd residual = answered - assumed;
+    const double moved = (answered - start).norm(), tolerance = std::max(settings.relative * moved, settings.displacement);
+    residuals.push_back(residual.norm());
+    const bool forces_agree = iteration == 1 || agree(forces, before, force_change);
+    window.residual = moved > 0 ? residuals.back() / moved : residuals.back();
+    window.converged = residuals.back() <= tolerance && forces_agree;
+    window.jumped = settled && !window.converged;
+    const bool last = iteration >= settings.most_iterations;
+    if (last && settings.stops && !window.converged && !settled) give_up(residuals, force_change);
+    if (window.converged || settled || last) {
+      if (settled) window.converged = true;
       acceleration_->end_window();
-      book_work(window, window.forces, end, moved_to);
+      balance(window);
+      book_work(window, window, now_, moved_to, end);
       now_ = std::move(end);
       return;
     }
-    assumed = acceleration_->next(assumed, answered);
+    const bool enclosed = jump_.enclosed();
+    jump_.note(assumed, residual, tolerance);
+    settled = jump_.closer_than(tolerance);
+    // The acceleration is not shown both sides of a jump: it would take it for a slope.
+    assumed = settled ? jump_.better() : jump_.enclosed() ? jump_.next() : acceleration_->next(assumed, answered);
+    if (jump_.enclosed() && !enclosed) acceleration_->forget();
     before = std::move(forces);
   }
+}
+
+// The first iterations of a window have nothing to be compared with. @param change  of the forces, over their size
+bool TwoWay::agree(const Forces& forces, const Forces& before, double& change) const {
+  double difference = 0, size = 0;
+  for (const auto& [surface, values] : forces) {
+    Vectors apart = values;
+    for (std::size_t k = 0; k < values.size(); ++k) apart[k] -= before.at(surface)[k];
+    difference = std::hypot(difference, size_of(apart));
+    size = std::hypot(size, size_of(values));
+  }
+  change = size > 0 ? difference / size : 0;
+  return difference <= std::max(case_.implicit.relative * size, case_.implicit.force);
 }
 
 void TwoWay::give_up(const std::vector<double>& residuals, double force_change) const {
@@ -177,8 +197,8 @@ void TwoWay::give_up(const std::vector<double>& residuals, double force_change) 
 }
 
 // Where the loaders' surfaces go by themselves: on with their velocity.
-TwoWay::Motions TwoWay::moved_on() const {
-  auto motions = now_;
+TwoWay::Motions TwoWay::moved_on(const Motions& start) const {
+  auto motions = start;
   for (auto& [surface, motion] : motions)
     for (std::size_t k = 0; k < motion.displacement.size(); ++k) motion.displacement[k] += case_.window * motion.velocity[k];
   return motions;
@@ -192,7 +212,7 @@ TwoWay::Motion TwoWay::carried(const Link& link, const Motions& motions) const {
   return result;
 }
 
-void TwoWay::begin_loaders(const Motions* end) {
+void TwoWay::begin_loaders(std::int64_t window, const Motions* end) {
   for (const auto& name : loaders_) {
     std::vector<protocol::Field> fields;
     for (const auto& link : account_.links()) {
@@ -206,18 +226,18 @@ void TwoWay::begin_loaders(const Motions* end) {
       fields.push_back({surface, "end_displacement", std::move(stop.displacement)});
       fields.push_back({surface, "end_velocity", std::move(stop.velocity)});
     }
-    crew_.begin_advance(name, window_, window_ + 1, std::move(fields), estimates());
+    crew_.begin_advance(name, window, window + 1, std::move(fields), estimates(window));
   }
 }
 
-void TwoWay::begin_structures(const Forces& forces) {
+void TwoWay::begin_structures(Forces forces) {
   for (const auto& name : structures_) {
     std::vector<protocol::Field> fields;
     for (const auto& [surface, motion] : now_) {
       const auto dot = surface.find('.');
       if (surface.substr(0, dot) != name) continue;
       const auto found = forces.find(surface);
-      fields.push_back({surface.substr(dot + 1), "force", found != forces.end() ? found->second : Vectors(motion.displacement.size(), Vec3::Zero())});
+      fields.push_back({surface.substr(dot + 1), "force", found != forces.end() ? std::move(found->second) : Vectors(motion.displacement.size(), Vec3::Zero())});
     }
     crew_.begin_advance(name, window_, window_ + 1, std::move(fields));
   }
@@ -230,7 +250,7 @@ void TwoWay::gather(std::size_t answers, WindowRecord& window, Forces& forces, M
     auto answer = crew_.next_answer();
     came[answer.participant] = std::move(answer.advance);
   }
-  for (const auto& [name, advance] : came) {
+  for (auto& [name, advance] : came) {
     for (const auto& [quantity, value] : advance.quantities) window.quantities.emplace_back(name + "." + quantity, value);
     if (!case_.receives(name)) {
       account_.map_forces(name, advance, window, forces);
@@ -239,15 +259,20 @@ void TwoWay::gather(std::size_t answers, WindowRecord& window, Forces& forces, M
     for (const auto& [surface, motion] : now_) {
       const auto dot = surface.find('.');
       if (surface.substr(0, dot) != name) continue;
-      motions[surface] = {field_of(advance, surface.substr(dot + 1), "displacement"), field_of(advance, surface.substr(dot + 1), "velocity")};
+      const auto own = surface.substr(dot + 1);
+      motions[surface] = {std::move(field_of(advance, own, "displacement")), std::move(field_of(advance, own, "velocity"))};
     }
   }
   for (const auto& [surface, values] : forces) window.forces[surface] = values;
-  if (estimates()) check_stability(came);
+  if (estimates(window_)) check_stability(came);
+}
+
+void TwoWay::balance(WindowRecord& window) const {
+  for (const auto& name : loaders_) account_.balance(name, window, window.forces);
 }
 
 // Contacts come and go slowly beside windows.
-bool TwoWay::estimates() const { return !masses_.empty() && (window_ < 10 || window_ % 20 == 0); }
+bool TwoWay::estimates(std::int64_t window) const { return !masses_.empty() && (window < 10 || window % 20 == 0); }
 
 void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& answers) {
   for (const auto& [to, mass] : masses_) {
@@ -289,25 +314,16 @@ void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& ans
 
 // What the coupling makes: the work of the forces on the structure, less that on the surface that sent them, which went another way or,
 // in parallel, felt others. With `conjugate_values` the two are the same for the same motion, on surfaces that do not coincide too.
-void TwoWay::book_work(WindowRecord& window, const Forces& acting, const Motions& end, const Motions& moved_to) const {
+void TwoWay::book_work(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const {
   for (std::size_t k = 0; k < account_.links().size(); ++k) {
     const auto& link = account_.links()[k];
     if (!link.mapping) continue;
-    const auto from = link.about->from.text(), to = link.about->to.text();
+    const auto to = link.about->to.text();
+    const auto& from = start.at(to).displacement;
     auto& row = window.ledger[k];
-    const auto ends_here = [&](const Link& other) { return other.mapping && other.about->to == link.about->to; };
-    const bool alone = std::count_if(account_.links().begin(), account_.links().end(), ends_here) == 1;
-    Vectors mapped;  // of this link alone, where others end there too
-    const auto arrived = [&](const Vectors& sent) -> const Vectors& {
-      if (alone && &sent == &window.forces.at(from)) return window.forces.at(to);  // mapped already
-      mapped.resize(link.to->points.size());
-      link.mapping->forces(sent, mapped);
-      return mapped;
-    };
-    row.work_sent = work(arrived(window.forces.at(from)), now_.at(to).displacement, moved_to.at(to).displacement);
-    const auto found = acting.find(from);
-    if (found == acting.end()) continue;  // nothing acted yet
-    row.work_received = work(arrived(found->second), now_.at(to).displacement, end.at(to).displacement);
+    row.work_sent = work(account_.arrived(k, window, window.forces), from, moved_to.at(to).displacement);
+    if (acting.forces.empty()) continue;  // nothing acted yet
+    row.work_received = work(account_.arrived(k, acting, acting.forces), from, end.at(to).displacement);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coupler/acceleration/acceleration.h"
+#include "coupler/acceleration/jump.h"
 #include "coupler/account.h"
 #include "coupler/case.h"
 #include "coupler/crew.h"
@@ -50,14 +51,17 @@ class TwoWay final : public Scheme {
   void step_in_parallel(WindowRecord& window);
   void step_with_iterations(WindowRecord& window);
 
-  void begin_loaders(const Motions* end);
-  bool estimates() const;
+  void begin_loaders(std::int64_t window, const Motions* end);
+  bool estimates(std::int64_t window) const;
   void check_stability(const std::map<std::string, protocol::Advance>& answers);
-  void begin_structures(const Forces& forces);
+  void begin_structures(Forces forces);
   void gather(std::size_t answers, WindowRecord& window, Forces& forces, Motions& motions);
-  void book_work(WindowRecord& window, const Forces& acting, const Motions& end, const Motions& moved_to) const;
-  Motions moved_on() const;
+  void balance(WindowRecord& window) const;
+  /// @param acting  whose forces loaded the structures
+  void book_work(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const;
+  Motions moved_on(const Motions& start) const;
   Motion carried(const Link& link, const Motions& motions) const;
+  bool agree(const Forces& forces, const Forces& before, double& change) const;
   void give_up(const std::vector<double>& residuals, double force_change) const;
 
   Eigen::VectorXd flat(const Motions& motions) const;
@@ -69,9 +73,10 @@ class TwoWay final : public Scheme {
   Reporter& reporter_;
   std::vector<std::string> loaders_, structures_;
   Motions now_;          // at the present window's start
-  Forces last_forces_;   // parallel: on the structures, of the window before
-  Forces last_sent_;     // parallel: by the surfaces that sent them
+  WindowRecord last_;    // parallel: the forces of the window before
+  bool begun_ = false;   // explicit: the loaders are in the next window already
   std::unique_ptr<Acceleration> acceleration_;  // implicit only
+  Jump jump_;
   std::int64_t window_ = 0;
   std::map<std::string, Vectors> masses_;  // of the structures' surfaces that know them; explicit schemes only
   bool warned_ = false;

@@ -69,20 +69,24 @@ bool send(zmq::socket_t& socket, const Message& message, const std::string& iden
 }
 
 std::optional<Parcel> receive_parcel(zmq::socket_t& socket, std::chrono::milliseconds wait, bool has_identity) {
-  zmq::pollitem_t item{socket.handle(), 0, ZMQ_POLLIN, 0};
-  try {
-    if (zmq::poll(&item, 1, wait) == 0) return std::nullopt;
-  } catch (const zmq::error_t& error) {
-    if (error.num() == EINTR) return std::nullopt;  // a signal: the caller looks at its flags and comes back
-    throw;
+  if (wait.count() > 0) {
+    zmq::pollitem_t item{socket.handle(), 0, ZMQ_POLLIN, 0};
+    try {
+      if (zmq::poll(&item, 1, wait) == 0) return std::nullopt;
+    } catch (const zmq::error_t& error) {
+      if (error.num() == EINTR) return std::nullopt;  // a signal: the caller looks at its flags and comes back
+      throw;
+    }
   }
+  auto flags = zmq::recv_flags::dontwait;  // the rest of a message is there when its first frame is
   Parcel parcel;
   bool first = has_identity;
   for (bool more = true; more;) {
     auto part = std::make_shared<zmq::message_t>();
     while (true) {
       try {
-        if (!socket.recv(*part, zmq::recv_flags::none)) return std::nullopt;
+        if (!socket.recv(*part, flags)) return std::nullopt;
+        flags = zmq::recv_flags::none;
         take_over();
         break;
       } catch (const zmq::error_t& error) {

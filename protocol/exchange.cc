@@ -32,23 +32,25 @@ T value(const Message& message, const Body& body, const char* key) {
   }
 }
 
-Array vectors(const std::string& name, const std::string& mesh, const std::vector<Vec3>& values) {
-  std::vector<double> flat(3 * values.size());
-  for (std::size_t k = 0; k < values.size(); ++k)
-    for (int d = 0; d < 3; ++d) flat[3 * k + static_cast<std::size_t>(d)] = values[k][d];
-  return Array::of(name, mesh, {values.size(), 3}, std::move(flat));
+// Eigen's vectors of three doubles lie one after another: they are sent as they are, and kept until they are on their way.
+Array vectors(const std::string& name, const std::string& mesh, std::vector<Vec3> values) {
+  static_assert(sizeof(Vec3) == 3 * sizeof(double));
+  const auto count = static_cast<std::uint64_t>(values.size());
+  const auto kept = std::make_shared<const std::vector<Vec3>>(std::move(values));
+  return Array::view(name, mesh, ArrayType::f8, {count, 3}, kept, reinterpret_cast<const std::byte*>(kept->data()));
 }
 
 std::vector<Vec3> vectors(const Array& array) {
   if (array.shape().size() != 2 || array.shape()[1] != 3)
     throw ProtocolError(fmt::format("array {} on {} must have the shape [points, 3]", array.name(), array.mesh()));
   const auto flat = array.doubles();
-  std::vector<Vec3> values(flat.size() / 3);
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    values[k] = Vec3(flat[3 * k], flat[3 * k + 1], flat[3 * k + 2]);
-    if (!values[k].allFinite())
-      throw ProtocolError(fmt::format("{} on {} is not finite at point {}", array.name(), array.mesh(), k));
-  }
+  const auto* first = reinterpret_cast<const Vec3*>(flat.data());
+  std::vector<Vec3> values(first, first + flat.size() / 3);
+  // x − x is zero for what is finite, and NaN for the rest.
+  const Eigen::Map<const Eigen::ArrayXd> all(flat.data(), static_cast<Eigen::Index>(flat.size()));
+  if (!((all - all).sum() == 0))
+    for (std::size_t k = 0; k < values.size(); ++k)
+      if (!values[k].allFinite()) throw ProtocolError(fmt::format("{} on {} is not finite at point {}", array.name(), array.mesh(), k));
   return values;
 }
 
@@ -187,12 +189,12 @@ std::vector<Surface> read_interface(const Message& message) {
   return surfaces;
 }
 
-Message advance_message(const Window& window, const std::vector<Field>& fields) {
+Message advance_message(const Window& window, std::vector<Field> fields) {
   Message message;
   message.kind = Kind::advance;
   message.body = {{"start", window.start}, {"end", window.end}};
   if (window.estimate) message.body["estimate"] = true;
-  for (const auto& field : fields) message.arrays.push_back(vectors(field.name, field.surface, field.values));
+  for (auto& field : fields) message.arrays.push_back(vectors(field.name, field.surface, std::move(field.values)));
   return message;
 }
 
@@ -235,11 +237,11 @@ std::vector<std::pair<std::string, double>> read_values(const Body& body) {
   return values;
 }
 
-Message advanced_message(const Advance& advance) {
+Message advanced_message(Advance advance) {
   Message message;
   message.kind = Kind::advanced;
   message.body = {{"values", pairs(advance.quantities)}, {"steps", advance.steps}};
-  for (const auto& field : advance.fields) message.arrays.push_back(vectors(field.name, field.surface, field.values));
+  for (auto& field : advance.fields) message.arrays.push_back(vectors(field.name, field.surface, std::move(field.values)));
   return message;
 }
 

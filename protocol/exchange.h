@@ -27,7 +27,7 @@ std::vector<Surface> read_interface(const Message& message);
 Message folder_message(Kind kind, const std::string& folder);
 std::string read_folder(const Message& message);
 
-Message advance_message(const Window& window, const std::vector<Field>& fields);
+Message advance_message(const Window& window, std::vector<Field> fields);
 struct AdvanceRequest {
   std::int64_t start = 0, end = 0;
   std::vector<Field> fields;
@@ -36,7 +36,7 @@ struct AdvanceRequest {
 /// Reads the fields that `uses` names as received, and passes over every other array (docs/protocol.md, §7).
 AdvanceRequest read_advance(const Message& message, const std::vector<Run::Use>& uses);
 
-Message advanced_message(const Advance& advance);
+Message advanced_message(Advance advance);
 Advance read_advanced(const Message& message);
 
 /// An answer without fields: `done`, with scalar values.

@@ -203,7 +203,7 @@ const Run& Session::run() const { return line_->run(); }
 void Session::offer(const std::vector<Surface>& surfaces) { line_->offer(surfaces); }
 bool Session::next(Window& window) { return line_->next(window); }
 const std::vector<Field>& Session::received() const { return line_->received(); }
-void Session::answer(const Advance& advance) { line_->answer(advanced_message(advance)); }
+void Session::answer(Advance advance) { line_->answer(advanced_message(std::move(advance))); }
 void Session::finish(std::vector<std::pair<std::string, double>> values) { line_->finish(std::move(values)); }
 void Session::fail(const std::string& text, bool mistake) noexcept { line_->fail(text, mistake); }
 

@@ -55,7 +55,7 @@ class Session {
   /// What came with the window; stays until the next.
   const std::vector<Field>& received() const;
   /// Answers the window.
-  void answer(const Advance& advance);
+  void answer(Advance advance);
   /// Answers that the run ends. @param values  for the summary; `peak_bytes` is added
   void finish(std::vector<std::pair<std::string, double>> values);
   /// Tells the coupler why this solver cannot go on; the run ends. Without effect where the coupler knows.

@@ -20,6 +20,8 @@ class Acceleration {
   virtual void begin_window() {}
   /// @param x, answered  x and H(x), of the same length in all windows. @return the next x, finite where both are
   virtual Vector next(const Vector& x, const Vector& answered) = 0;
+  /// What was learnt is of no use any more: the answer has jumped.
+  virtual void forget() {}
   /// The window is accepted.
   virtual void end_window() {}
   /// Between two windows: what it knows.
@@ -73,6 +75,7 @@ class InterfaceQuasiNewton final : public Acceleration {
   explicit InterfaceQuasiNewton(const AccelerationOptions& options) : options_(options) {}
   void begin_window() override;
   Vector next(const Vector& x, const Vector& answered) override;
+  void forget() override;
   void end_window() override;
   void write(io::StateWriter& writer) override { state(writer); }
   void read(io::StateReader& reader) override { state(reader); }
@@ -85,7 +88,6 @@ class InterfaceQuasiNewton final : public Acceleration {
     archive("answers", answers_);
     archive("ages", ages_);
   }
-  void forget();
   void drop(std::size_t column);
 
   AccelerationOptions options_;

@@ -9,29 +9,19 @@
 namespace acopla::coupler {
 namespace {
 
-/// Neumaier's sum: the round-off of each addition is kept apart and added at the end.
-class CompensatedSum {
+/// Eight sums at once, each compensated: the round-off of an addition (Knuth's two-sum, which asks for no branch) is kept apart and added at the end.
+class CompensatedSums {
  public:
-  void add(double value) {
-    const double sum = sum_ + value;
-    rest_ += std::abs(sum_) >= std::abs(value) ? (sum_ - sum) + value : (value - sum) + sum_;
-    sum_ = sum;
+  using Lanes = Eigen::Array<double, 8, 1>;
+  void add(const Lanes& values) {
+    const Lanes sums = sums_ + values, part = sums - sums_;
+    rests_ += (sums_ - (sums - part)) + (values - part);
+    sums_ = sums;
   }
-  double value() const { return sum_ + rest_; }
+  Lanes values() const { return sums_ + rests_; }
 
  private:
-  double sum_ = 0, rest_ = 0;
-};
-
-class CompensatedVector {
- public:
-  void add(const Vec3& value) {
-    for (int d = 0; d < 3; ++d) sums_[d].add(value[d]);
-  }
-  Vec3 value() const { return {sums_[0].value(), sums_[1].value(), sums_[2].value()}; }
-
- private:
-  CompensatedSum sums_[3];
+  Lanes sums_ = Lanes::Zero(), rests_ = Lanes::Zero();
 };
 
 double fraction(double part, double whole) {
@@ -44,16 +34,16 @@ double fraction(double part, double whole) {
 Resultant resultant(std::span<const Vec3> points, std::span<const Vec3> forces, const Vec3& about) {
   if (points.size() != forces.size())
     throw std::invalid_argument("a resultant needs one force for every point");
-  CompensatedVector force, moment;
-  CompensatedSum size, turning_size;
+  CompensatedSums sums;
+  CompensatedSums::Lanes row;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const Vec3 arm = points[k] - about;
-    force.add(forces[k]);
-    moment.add(arm.cross(forces[k]));
-    size.add(forces[k].norm());
-    turning_size.add(arm.norm() * forces[k].norm());
+    const Vec3 arm = points[k] - about, moment = arm.cross(forces[k]);
+    const double size = forces[k].norm();
+    row << forces[k][0], forces[k][1], forces[k][2], moment[0], moment[1], moment[2], size, arm.norm() * size;
+    sums.add(row);
   }
-  return {force.value(), moment.value(), size.value(), turning_size.value()};
+  const auto total = sums.values();
+  return {Vec3(total.segment<3>(0)), Vec3(total.segment<3>(3)), total[6], total[7]};
 }
 
 Loss loss(const Resultant& sent, const Resultant& received) {

@@ -9,7 +9,7 @@ namespace acopla::coupler {
 
 using geometry::Vec3;
 
-/// Sums over the points of a surface, compensated (Neumaier 1974) so that their own round-off stays
+/// Sums over the points of a surface, compensated (Knuth 1969) so that their own round-off stays
 /// below 1e-15 of `size` and `turning_size` whatever the number of points.
 struct Resultant {
   Vec3 force = Vec3::Zero();   ///< Σ F [N]

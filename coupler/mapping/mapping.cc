@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -77,6 +79,8 @@ class Mapping::Builder {
     // What `forces` does is Σ w_k x_k, whatever the search made of it.
     Vec3 projected = Vec3::Zero();
     for (std::size_t k = 0; k < nodes.size(); ++k) {
+      // A point on a node or an edge leaves the others nothing but rounding; where the meshes match, this is most of them.
+      if (std::abs(partner.projection.weights[k]) < std::numeric_limits<double>::epsilon()) continue;
       mapping_.nodes_.push_back(nodes[k]);
       mapping_.weights_.push_back(partner.projection.weights[k]);
       projected += partner.projection.weights[k] * to_.points[nodes[k]];

@@ -207,6 +207,35 @@ TEST_F(Loopback, MeanGivesTheMeanOverItsWindowsOnce) {
     EXPECT_LT((receiver.got[0].force[p] - (a[p] + b[p] + c[p]) / 3).norm(), 1e-14);
 }
 
+TEST_F(Loopback, ARunningMeanIsOverTheLastWindows) {
+  run(case_text("loads = \"running_mean\"\nover = 0.3\nloads_from = 0.1"));
+  ASSERT_EQ(receiver.got.size(), 9u);
+  for (int window = 1; window < 10; ++window) {
+    const auto& got = receiver.got[static_cast<std::size_t>(window - 1)];
+    EXPECT_EQ(got.window.start, window);
+    const int first = std::max(0, window - 2);
+    for (std::size_t p = 0; p < got.force.size(); ++p) {
+      geometry::Vec3 sum = geometry::Vec3::Zero();
+      for (int k = first; k <= window; ++k) sum += mapped(k)[p];
+      EXPECT_LT((got.force[p] - sum / (window + 1 - first)).norm(), 1e-14) << window;
+    }
+  }
+}
+
+// Node by node the window whose force is largest there.
+TEST_F(Loopback, APeakIsTheLargestForceOfEachNode) {
+  run(case_text("loads = \"peak\"\nat = 0.9\nover = 0.5"));
+  ASSERT_EQ(receiver.got.size(), 1u);
+  EXPECT_EQ(receiver.got[0].window.start, 4);
+  EXPECT_EQ(receiver.got[0].window.end, 9);
+  for (std::size_t p = 0; p < receiver.got[0].force.size(); ++p) {
+    auto largest = mapped(4)[p];
+    for (int k = 5; k < 9; ++k)
+      if (mapped(k)[p].norm() > largest.norm()) largest = mapped(k)[p];
+    EXPECT_EQ(receiver.got[0].force[p], largest);
+  }
+}
+
 TEST_F(Loopback, LoadsFromSkipsEarlierWindows) {
   run(case_text("loads_from = 0.6"));
   ASSERT_EQ(receiver.got.size(), 4u);

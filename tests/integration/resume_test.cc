@@ -122,7 +122,8 @@ TEST_P(Resumed, IsBitByBitTheRunThatWasNotStopped) {
   EXPECT_EQ(resumed.participants.at(0).steps, whole.participants.at(0).steps);
 }
 INSTANTIATE_TEST_SUITE_P(Schemes, Resumed,
-                         testing::Values("scheme = \"one-way\"", "scheme = \"one-way\"\nloads = \"mean\"\nat = 1.0\nover = 0.5", "scheme = \"explicit\"",
+                         testing::Values("scheme = \"one-way\"", "scheme = \"one-way\"\nloads = \"mean\"\nat = 1.0\nover = 0.5", "scheme = \"one-way\"\nloads = \"running_mean\"\nover = 0.25",
+                                         "scheme = \"one-way\"\nloads = \"peak\"", "scheme = \"explicit\"",
                                          "scheme = \"parallel\"\nallow_unstable_scheme = true", "scheme = \"implicit\"\nacceleration = \"aitken\"",
                                          "scheme = \"implicit\"\nacceleration = \"iqn-ils\"\nreuse = 8"));
 

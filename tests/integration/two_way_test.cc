@@ -149,6 +149,27 @@ TEST(TwoWay, AContactThatBeginsLateIsMetByEveryAcceleration) {
   }
 }
 
+// With a dashpot the force jumps where the masses touch, and whether they do in this step or the next is for the iterations to find: where no motion agrees with
+// its own force, both sides of the jump are found, within the tolerance of the motion.
+TEST(TwoWay, AContactThatBeginsWithAJumpIsMetOnOneSideOfIt) {
+  std::int64_t jumped = 0;
+  for (int k = 0; k < 20; ++k) {
+    Swing s;
+    s.first.only_pushes = true;
+    s.first.dashpot = 20;  // 20 N at first touch
+    s.second.own_mass = 0.1;  // which the jump moves
+    s.first.gap = 0.3 + 1e-3 * k;
+    s.first.wall = s.first.u = s.second.wall = 0;
+    s.first.v = 1;
+    s.outcome = run(case_text(1.0 / 64, 0.75, "scheme = \"implicit\"\ntolerance = 1e-10\nmax_iterations = 80"), s.first, s.second);
+    ASSERT_EQ(s.outcome.status, Status::met) << s.first.gap << s.outcome.error->message;
+    EXPECT_NEAR(s.first.v + 0.1 * s.second.v, 1, 4e-15);
+    EXPECT_EQ(s.outcome.ledgers.not_converged, 0);
+    jumped += s.outcome.ledgers.jumped;
+  }
+  EXPECT_GT(jumped, 3);
+}
+
 // Against a fixed partner the staggered scheme is neutral, with dashpots it loses energy, until (k Δt² + 2 c Δt)/m = 4 (docs/theory.md): whatever the
 // structure's own spring is, which its implicit step takes.
 TEST(TwoWay, TheStaggeredSchemeIsStableUpToItsLimitAndNotBeyond) {
@@ -217,8 +238,8 @@ TEST(TwoWay, AWindowThatDoesNotConvergeSaysHow) {
     return outcome.error ? outcome.error->message : "";
   };
   EXPECT_NE(message("scheme = \"implicit\"\nacceleration = \"constant\"\nrelaxation = 0.01\nmax_iterations = 5").find("creeps"), std::string::npos);
-  // A light mass behind a stiff spring: the answer overshoots, each time more.
-  const auto grows = message("scheme = \"implicit\"\nacceleration = \"constant\"\nrelaxation = 1\nmax_iterations = 9", 0.01);
+  // A light mass behind a stiff spring: the answer overshoots, and more the second time; a third would be taken from between them.
+  const auto grows = message("scheme = \"implicit\"\nacceleration = \"constant\"\nrelaxation = 1\nmax_iterations = 2", 0.01);
   EXPECT_NE(grows.find("grows"), std::string::npos) << grows;
   Swing accepted;
   accepted.outcome = run(case_text(1.0 / 16, 1, "scheme = \"implicit\"\nacceleration = \"constant\"\nrelaxation = 0.01\nmax_iterations = 5\non_fail = \"accept\""),
