@@ -26,8 +26,8 @@ struct ServeOptions {
   std::string name;      ///< this participant's name in the case
   /// Gives up when the coupler was silent for this long (no ping arrived).
   std::chrono::milliseconds patience{10000};
-  std::string keys;  ///< folder with the participant's keys, for tcp beyond loopback; empty: none
   zmq::context_t* context = nullptr;  ///< shared context, needed for inproc; otherwise one is made
+  std::string keys = {};  ///< folder with the participant's keys, for tcp beyond loopback; empty: none
 };
 
 /// What the coupler may ask between windows; what is empty is answered as unsupported.
