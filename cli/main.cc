@@ -2,10 +2,14 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <string_view>
 
+#include "cli/conformance.h"
 #include "cli/inspect.h"
 #include "cli/run.h"
 #include "io/error.h"
+#include "protocol/keys.h"
 
 namespace acopla::cli {
 namespace {
@@ -43,6 +47,30 @@ CLI::App* declare_replay(CLI::App& app, Arguments& arguments) {
   return replay;
 }
 
+int keys(const std::string& folder) {
+  protocol::make_keys(folder);
+  fmt::print("{0}/coupler.keys: for `acopla-coupler --keys`, stays on its machine\n"
+             "{0}/participant.keys: copy it, secretly, to where participants run (--keys DIR, or ACOPLA_KEYS=DIR)\n", folder);
+  return io::exit_done;
+}
+
+CLI::App* declare_conformance(CLI::App& app, ConformanceOptions& options, bool& lists) {
+  auto* command = app.add_subcommand("conformance", "play the coupler against a participant, and say rule by rule what it does right and wrong");
+  command->footer("After -- stands the participant's command, with all that begins with a dash (default: what the case says):\n"
+                  "  acopla conformance --use top:force:displacement,velocity -- /usr/bin/python3 plate.py");
+  command->add_option("--case", options.case_file, "a case, whose interfaces say what the participant receives and sends");
+  command->add_option("--as", options.participant, "its name in the case (default: the only one)");
+  command->add_option("--use", options.uses, "without a case: SURFACE:RECEIVES:SENDS, e.g. top:force:displacement,velocity")->allow_extra_args(false);
+  command->add_option("--dimension", options.dimension, "without a case: 2 or 3 (default 3)")->check(CLI::IsMember({2, 3}));
+  command->add_option("--window", options.window, "length of a window [s] (default: the case's, or 0.01)")->check(CLI::PositiveNumber);
+  command->add_option("--answer-limit", options.answer_limit, "longest time for an answer [s] (default 60)")->check(CLI::PositiveNumber);
+  command->add_option("--start-limit", options.start_limit, "longest time to hello, and to interface [s] (default 60)")->check(CLI::PositiveNumber);
+  command->add_option("--exit-limit", options.exit_limit, "longest time to end when the run is over [s] (default 10)")->check(CLI::PositiveNumber);
+  command->add_flag("--quick", options.quick, "leave out what takes ten seconds");
+  command->add_flag("--list", lists, "print the rules, and end");
+  return command;
+}
+
 int main_program(int argc, char** argv) {
   CLI::App app("Acopla couples particles to structures: granular loads on deforming structures.");
   app.set_version_flag("--version", "acopla " ACOPLA_VERSION);
@@ -61,14 +89,26 @@ int main_program(int argc, char** argv) {
       app.add_subcommand("explain", "say what a case needs, what it leaves out, and what it costs");
   add_case(explain_command, arguments);
   auto* replay_command = declare_replay(app, arguments);
+  ConformanceOptions examined;
+  bool lists = false;
+  auto* conformance_command = declare_conformance(app, examined, lists);
+  // What follows -- is somebody else's command line.
+  const bool examines = argc > 1 && std::string_view(argv[1]) == "conformance";
+  const auto words = examines ? std::find(argv, argv + argc, std::string_view("--")) : argv + argc;
+  if (words != argv + argc) examined.command.assign(words + 1, argv + argc);
+  std::string keys_folder;
+  auto* keys_command = app.add_subcommand("keys", "make the keys that open tcp beyond loopback: coupler.keys and participant.keys");
+  keys_command->add_option("folder", keys_folder, "folder to write them to")->required();
   try {
-    app.parse(argc, argv);
+    app.parse(static_cast<int>(words - argv), argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? io::exit_done : io::exit_user_error;
   }
   if (*run_command) return run({arguments.case_file, arguments.results, std::nullopt, arguments.resume});
   if (*check_command) return check(arguments.case_file);
   if (*explain_command) return explain(arguments.case_file);
+  if (*keys_command) return keys(keys_folder);
+  if (*conformance_command) return lists ? list_rules() : conformance(examined);
   if (*replay_command)
     return run({arguments.case_file, arguments.results,
                 coupler::Substitute{arguments.replay_as,

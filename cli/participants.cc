@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 
 namespace acopla::cli {
@@ -20,6 +21,13 @@ std::vector<std::string> solvers_beside_us() {
   }
   std::sort(found.begin(), found.end());
   return found;
+}
+
+// Where `import acopla` finds the Python client; before what the user's own PYTHONPATH names.
+std::string python_path() {
+  const auto client = fs::path(own_folder()).parent_path() / "share/acopla/python";
+  const char* theirs = std::getenv("PYTHONPATH");
+  return theirs && *theirs ? client.string() + ":" + theirs : client.string();
 }
 
 std::string solver_path(const coupler::ParticipantCase& participant) {
@@ -43,7 +51,7 @@ std::string solver_path(const coupler::ParticipantCase& participant) {
 Command command_of(const coupler::ParticipantCase& participant, const std::string& case_file,
                    const std::string& endpoint) {
   Command command;
-  const auto full = fs::absolute(case_file).lexically_normal();
+  const auto full = case_file.empty() ? fs::path() : fs::absolute(case_file).lexically_normal();
   command.environment = {{"ACOPLA_ENDPOINT", endpoint},
                          {"ACOPLA_PARTICIPANT", participant.name},
                          {"ACOPLA_CASE", full.string()}};
@@ -52,6 +60,7 @@ Command command_of(const coupler::ParticipantCase& participant, const std::strin
     if (!endpoint.empty()) command.words.insert(command.words.end(), {"--connect", endpoint});
     return command;
   }
+  command.environment.emplace_back("PYTHONPATH", python_path());
   command.words = participant.command;
   command.folder =
       full.parent_path().string();  // a script beside the case is named as it is written there

@@ -1,5 +1,5 @@
 # What is installed: the programs, and what a user's own contact law needs (docs/laws.md): the headers of the laws and a CMake package.
-#   cmake --install build/release --prefix PREFIX [--component programs | laws]
+#   cmake --install build/release --prefix PREFIX [--component programs | laws | participant]
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -7,6 +7,8 @@ install(TARGETS acopla acopla-coupler acopla-dem COMPONENT programs RUNTIME DEST
 if(ACOPLA_FEM)
   install(TARGETS acopla-fem COMPONENT programs RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
+
+install(FILES ${PROJECT_SOURCE_DIR}/protocol/python/acopla.py COMPONENT programs DESTINATION ${CMAKE_INSTALL_DATADIR}/acopla/python)
 
 # acopla::laws, the one target that a library of laws links: where the headers are, and the options of this program's own kernels. The
 # instruction set must be the same, as it decides how many contacts a pack holds. Nothing is left open to the program that loads the
@@ -35,13 +37,25 @@ foreach(header
   install(FILES ${PROJECT_SOURCE_DIR}/${header} DESTINATION ${laws_headers}/${folder} COMPONENT laws)
 endforeach()
 
+# acopla::participant, the C interface of the protocol (docs/guide.md). An export of its own, so that either can be installed without the other.
+install(TARGETS acopla_participant EXPORT AcoplaParticipantTargets COMPONENT participant LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+        NAMELINK_COMPONENT participant)
+install(FILES ${PROJECT_SOURCE_DIR}/protocol/acopla.h COMPONENT participant DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/Acopla)
+install(EXPORT AcoplaParticipantTargets NAMESPACE acopla:: DESTINATION ${package} COMPONENT participant)
 install(EXPORT AcoplaTargets NAMESPACE acopla:: DESTINATION ${package} COMPONENT laws)
 file(WRITE ${PROJECT_BINARY_DIR}/AcoplaConfig.cmake "include(CMakeFindDependencyMacro)
-find_dependency(Eigen3 3.4 NO_MODULE)
-include(\${CMAKE_CURRENT_LIST_DIR}/AcoplaTargets.cmake)
+if(EXISTS \${CMAKE_CURRENT_LIST_DIR}/AcoplaTargets.cmake)
+  find_dependency(Eigen3 3.4 NO_MODULE)
+  include(\${CMAKE_CURRENT_LIST_DIR}/AcoplaTargets.cmake)
+endif()
+include(\${CMAKE_CURRENT_LIST_DIR}/AcoplaParticipantTargets.cmake OPTIONAL)
 ")
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/AcoplaConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/AcoplaConfig.cmake ${PROJECT_BINARY_DIR}/AcoplaConfigVersion.cmake DESTINATION ${package} COMPONENT laws)
+foreach(component laws participant)
+  install(FILES ${PROJECT_BINARY_DIR}/AcoplaConfig.cmake ${PROJECT_BINARY_DIR}/AcoplaConfigVersion.cmake DESTINATION ${package} COMPONENT ${component})
+endforeach()
 # From the build tree too: cmake -DAcopla_DIR=build/release.
 export(EXPORT AcoplaTargets NAMESPACE acopla:: FILE ${PROJECT_BINARY_DIR}/AcoplaTargets.cmake)
+export(EXPORT AcoplaParticipantTargets NAMESPACE acopla:: FILE ${PROJECT_BINARY_DIR}/AcoplaParticipantTargets.cmake)

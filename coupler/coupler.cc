@@ -111,7 +111,7 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
 Outcome Coupler::run() {
   const auto begin = std::chrono::steady_clock::now();
   Checkpoints checkpoints(case_, options_.results, options_.resumes);
-  Crew crew(context_, options_.endpoint, case_, options_.results, reporter_, options_.outside, options_.resumes);
+  Crew crew(context_, options_.endpoint, case_, options_.results, reporter_, options_.outside, options_.resumes, options_.keys);
   Outcome outcome;
   {
     Stages stages(case_);

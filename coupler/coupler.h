@@ -8,6 +8,7 @@
 #include "coupler/outcome.h"
 #include "coupler/outside.h"
 #include "coupler/reporter.h"
+#include "protocol/keys.h"
 
 namespace acopla::coupler {
 
@@ -18,6 +19,7 @@ class Coupler {
     std::string results;         ///< an existing folder; empty: nothing is written
     Outside* outside = nullptr;  ///< signals and the launcher; may be null
     bool resumes = false;        ///< goes on from the checkpoint in `results`
+    const protocol::Keys* keys = nullptr;  ///< for tcp beyond loopback; may be null
   };
   /// @param context  shared with participants over inproc. Everything must outlive the coupler.
   Coupler(zmq::context_t& context, const Case& read, Options options, Reporter& reporter)

@@ -41,14 +41,15 @@ std::string printable(std::string text) {
 }  // namespace
 
 Crew::Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
-           const std::string& results, Reporter& reporter, Outside* outside, bool resumes)
+           const std::string& results, Reporter& reporter, Outside* outside, bool resumes,
+           const protocol::Keys* keys)
     : case_(read),
       results_(results),
       resumes_(resumes),
       reporter_(reporter),
       outside_(outside),
-      hub_(context, endpoint),
-      pulse_(context, pulse_endpoint(hub_.endpoint())),
+      hub_(context, endpoint, keys),
+      pulse_(context, pulse_endpoint(hub_.endpoint()), keys),
       begin_(Clock::now()) {
   for (const auto& participant : case_.participants) {
     auto& member = members_[participant.name];
@@ -410,6 +411,32 @@ void Crew::start_replay(Member& member) {
   take_surfaces(member, member.replay->start(run_for(*member.about)));
 }
 
+std::vector<protocol::Run::Use> uses_of(const Case& read, const std::string& participant) {
+  std::vector<protocol::Run::Use> uses;
+  const auto use = [&](const std::string& surface) -> protocol::Run::Use& {
+    for (auto& known : uses)
+      if (known.surface == surface) return known;
+    uses.push_back({surface, {}, {}});
+    return uses.back();
+  };
+  for (const auto& interface : read.interfaces) {
+    const bool moves = read.scheme != SchemeKind::one_way && !interface.recorded_only();
+    if (interface.from.participant == participant) {
+      auto& from = use(interface.from.surface);
+      from.sends = {"force"};
+      if (moves) from.receives = {"displacement", "velocity"};
+      if (moves && read.scheme == SchemeKind::serial_implicit)
+        from.receives.insert(from.receives.end(), {"end_displacement", "end_velocity"});
+    }
+    if (interface.to.participant == participant) {
+      auto& to = use(interface.to.surface);
+      to.receives = {"force"};
+      if (moves) to.sends = {"displacement", "velocity"};
+    }
+  }
+  return uses;
+}
+
 protocol::Run Crew::run_for(const ParticipantCase& participant) const {
   protocol::Run run;
   run.tick = case_.window;
@@ -418,27 +445,7 @@ protocol::Run Crew::run_for(const ParticipantCase& participant) const {
   run.resumes = resumes_;
   std::copy(case_.gravity.data(), case_.gravity.data() + 3, run.gravity);
   if (!results_.empty()) run.results = results_ + "/" + participant.name;
-  const auto use = [&](const std::string& surface) -> protocol::Run::Use& {
-    for (auto& known : run.uses)
-      if (known.surface == surface) return known;
-    run.uses.push_back({surface, {}, {}});
-    return run.uses.back();
-  };
-  for (const auto& interface : case_.interfaces) {
-    const bool moves = case_.scheme != SchemeKind::one_way && !interface.recorded_only();
-    if (interface.from.participant == participant.name) {
-      auto& from = use(interface.from.surface);
-      from.sends = {"force"};
-      if (moves) from.receives = {"displacement", "velocity"};
-      if (moves && case_.scheme == SchemeKind::serial_implicit)
-        from.receives.insert(from.receives.end(), {"end_displacement", "end_velocity"});
-    }
-    if (interface.to.participant == participant.name) {
-      auto& to = use(interface.to.surface);
-      to.receives = {"force"};
-      if (moves) to.sends = {"displacement", "velocity"};
-    }
-  }
+  run.uses = uses_of(case_, participant.name);
   return run;
 }
 

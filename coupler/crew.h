@@ -22,6 +22,9 @@
 
 namespace acopla::coupler {
 
+/// What the case couples of a participant's surfaces, as its welcome says it.
+std::vector<protocol::Run::Use> uses_of(const Case& read, const std::string& participant);
+
 /// The coupler's half of the state machine (docs/protocol.md, §3). Whatever a participant does
 /// wrong, and whatever befalls it, ends in a Failure that names it and its state; whatever a
 /// stranger does is answered and noted.
@@ -30,7 +33,8 @@ class Crew {
   /// Binds the hub and the pulse. @param outside may be null. @throws io::UserError when the
   /// address is taken
   Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
-       const std::string& results, Reporter& reporter, Outside* outside, bool resumes = false);
+       const std::string& results, Reporter& reporter, Outside* outside, bool resumes = false,
+       const protocol::Keys* keys = nullptr);
 
   /// Waits until everybody said hello and sent its surfaces. @throws Failure, Interrupted
   void assemble();

@@ -15,7 +15,7 @@ namespace acopla::coupler {
 namespace {
 
 struct Arguments {
-  std::string case_file, endpoint = "tcp://127.0.0.1:*", results;
+  std::string case_file, endpoint = "tcp://127.0.0.1:*", results, keys = protocol::keys_of_environment();
   std::string record, replay_as, replay_of;
   std::optional<double> replay_from, replay_to;
   double replay_at = 0;
@@ -50,9 +50,11 @@ int run(const Arguments& arguments) {
                            ? arguments.results
                            : io::make_results_folder(arguments.case_file, arguments.results);
   if (arguments.resumes && results.empty()) throw io::UserError("--resume goes on with a run: name its folder with --results.");
+  std::optional<protocol::Keys> keys;
+  if (!arguments.keys.empty() && arguments.endpoint.starts_with("tcp://")) keys = protocol::read_coupler_keys(arguments.keys);
   zmq::context_t context;
   const auto outcome =
-      Coupler(context, read, {arguments.endpoint, results, &outside, arguments.resumes}, *reporter).run();
+      Coupler(context, read, {arguments.endpoint, results, &outside, arguments.resumes, keys ? &*keys : nullptr}, *reporter).run();
   if (!arguments.supervised) fmt::print("results in {}\n", results);
   return outcome.exit_code;
 }
@@ -60,7 +62,8 @@ int run(const Arguments& arguments) {
 void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("case", arguments.case_file, "the case file, e.g. case.toml")->required();
   app.add_option("--bind", arguments.endpoint,
-                 "address for the participants, ipc:///PATH or tcp://127.0.0.1:PORT");
+                 "address for the participants, ipc:///PATH or tcp://127.0.0.1:PORT; with keys tcp://0.0.0.0:PORT too");
+  app.add_option("--keys", arguments.keys, "folder with coupler.keys, for tcp beyond loopback (default: ACOPLA_KEYS)");
   app.add_option("--results", arguments.results, "folder for the results (must not exist, unless a run is resumed)");
   app.add_flag("--resume", arguments.resumes, "go on from the checkpoint in the results folder");
   app.add_option("--replay", arguments.record,

@@ -25,7 +25,7 @@ void take_over() {}
 }  // namespace
 
 
-void check_endpoint(const std::string& endpoint) {
+void check_endpoint(const std::string& endpoint, bool has_keys) {
   if (endpoint.starts_with("ipc://") || endpoint.starts_with("inproc://")) {
     constexpr std::size_t longest = 107;  // sockaddr_un
     if (endpoint.starts_with("ipc://") && endpoint.size() - 6 > longest)
@@ -34,10 +34,12 @@ void check_endpoint(const std::string& endpoint) {
   }
   if (!endpoint.starts_with("tcp://"))
     throw io::UserError(fmt::format("{}: not an endpoint. Use ipc:///PATH or tcp://127.0.0.1:PORT.", endpoint));
+  if (has_keys) return;
   const auto host = endpoint.substr(6, endpoint.rfind(':') - 6);
   if (host != "127.0.0.1" && host != "localhost" && host != "[::1]")
     throw io::UserError(fmt::format("{}: tcp is open to loopback only, because messages are neither signed nor "
-                                    "encrypted. Use tcp://127.0.0.1:PORT.", endpoint));
+                                    "encrypted without keys. Use tcp://127.0.0.1:PORT, or make keys by `acopla keys DIR` and give them to "
+                                    "both sides with --keys DIR.", endpoint));
 }
 
 bool send(zmq::socket_t& socket, const Message& message, const std::string& identity) {
@@ -103,8 +105,9 @@ std::optional<Parcel> receive_parcel(zmq::socket_t& socket, std::chrono::millise
   return parcel;
 }
 
-Channel::Channel(zmq::context_t& context, const std::string& endpoint) : socket_(context, zmq::socket_type::dealer) {
-  check_endpoint(endpoint);
+Channel::Channel(zmq::context_t& context, const std::string& endpoint, const Keys* keys) : socket_(context, zmq::socket_type::dealer) {
+  check_endpoint(endpoint, keys);
+  if (keys) use_as_participant(socket_, endpoint, *keys);
   socket_.set(zmq::sockopt::linger, 2000);  // last words reach the coupler
   socket_.set(zmq::sockopt::sndtimeo, 2000);  // without a peer a send would wait for ever
   socket_.set(zmq::sockopt::reconnect_ivl, 20);  // ms; the coupler may bind after we connect

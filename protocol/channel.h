@@ -7,11 +7,13 @@
 #include <zmq.hpp>
 
 #include "protocol/codec.h"
+#include "protocol/keys.h"
 
 namespace acopla::protocol {
 
-/// @throws io::UserError for an address that is none, or a tcp address beyond loopback (CURVE keys are not there yet)
-void check_endpoint(const std::string& endpoint);
+/// @param has_keys  messages will be encrypted and both sides known to each other
+/// @throws io::UserError for an address that is none, or a tcp address beyond loopback without keys
+void check_endpoint(const std::string& endpoint, bool has_keys = false);
 
 /// Sends a message, its arrays without a copy. `identity` addresses a peer of a ROUTER; empty for other sockets.
 /// @return false when the peer is gone, or the socket's time for sending is over
@@ -28,7 +30,8 @@ std::optional<Parcel> receive_parcel(zmq::socket_t& socket, std::chrono::millise
 /// The solver's end: a DEALER.
 class Channel {
  public:
-  Channel(zmq::context_t& context, const std::string& endpoint);
+  /// @param keys  of a participant, for tcp; may be null
+  Channel(zmq::context_t& context, const std::string& endpoint, const Keys* keys = nullptr);
   /// @throws ProtocolError when no coupler takes it within two seconds
   void send(const Message& message);
   /// @throws ProtocolError when what came is not a message

@@ -46,6 +46,31 @@ void pack_value(Packer& packer, const Body& value) {
   }
 }
 
+// Text is UTF-8 (RFC 3629): no longer form than needed, no surrogates, nothing beyond U+10FFFF. What is not could be written into no summary.
+bool is_utf8(std::string_view text) {
+  for (std::size_t k = 0; k < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[k++]);
+    if (lead < 0x80) continue;
+    const int rest = lead >= 0xc2 && lead < 0xe0 ? 1 : lead >= 0xe0 && lead < 0xf0 ? 2 : lead >= 0xf0 && lead < 0xf5 ? 3 : 0;
+    if (rest == 0) return false;
+    for (int j = 0; j < rest; ++j, ++k) {
+      if (k >= text.size()) return false;
+      const auto next = static_cast<unsigned char>(text[k]);
+      const bool first = j == 0;
+      const unsigned char low = first && lead == 0xe0 ? 0xa0 : first && lead == 0xf0 ? 0x90 : 0x80;
+      const unsigned char high = first && lead == 0xed ? 0x9f : first && lead == 0xf4 ? 0x8f : 0xbf;
+      if (next < low || next > high) return false;
+    }
+  }
+  return true;
+}
+
+std::string unpack_text(const msgpack::object_str& object) {
+  std::string text(object.ptr, object.size);
+  if (!is_utf8(text)) throw ProtocolError("the header holds text that is not UTF-8");
+  return text;
+}
+
 Body unpack_value(const msgpack::object& object) {
   switch (object.type) {
     case msgpack::type::NIL: return nullptr;
@@ -54,7 +79,7 @@ Body unpack_value(const msgpack::object& object) {
     case msgpack::type::NEGATIVE_INTEGER: return object.via.i64;
     case msgpack::type::FLOAT32:
     case msgpack::type::FLOAT64: return object.via.f64;
-    case msgpack::type::STR: return std::string(object.via.str.ptr, object.via.str.size);
+    case msgpack::type::STR: return unpack_text(object.via.str);
     case msgpack::type::ARRAY: {
       Body list = Body::array();
       for (std::uint32_t k = 0; k < object.via.array.size; ++k) list.push_back(unpack_value(object.via.array.ptr[k]));
@@ -65,7 +90,7 @@ Body unpack_value(const msgpack::object& object) {
       for (std::uint32_t k = 0; k < object.via.map.size; ++k) {
         const auto& [key, value] = object.via.map.ptr[k];
         if (key.type != msgpack::type::STR) throw ProtocolError("a header map has a key that is not text");
-        std::string name(key.via.str.ptr, key.via.str.size);
+        auto name = unpack_text(key.via.str);
         if (map.contains(name)) throw ProtocolError(fmt::format("the header names \"{}\" twice", name));
         map[std::move(name)] = unpack_value(value);
       }
@@ -114,14 +139,19 @@ Array read_array(const Body& entry_of, const Frame& frame) {
   const auto mesh = entry(entry_of, "mesh", &Body::is_string, "text").get<std::string>();
   const auto type = named(all_types, entry(entry_of, "type", &Body::is_string, "text").get<std::string>(), "type");
   std::vector<std::uint64_t> shape;
-  std::uint64_t bytes = bytes_of(type);
-  for (const auto& extent : entry(entry_of, "shape", &Body::is_array, "list")) {
+  std::uint64_t bytes = bytes_of(type), without_zeros = bytes;
+  const auto& extents = entry(entry_of, "shape", &Body::is_array, "list");
+  constexpr std::size_t most_extents = 32;  // what NumPy can hold
+  if (extents.size() > most_extents) throw ProtocolError(fmt::format("array {} has an impossible shape", name));
+  for (const auto& extent : extents) {
     if (!extent.is_number_unsigned()) throw ProtocolError(fmt::format("array {} has a shape that is not of counts", name));
     shape.push_back(extent.get<std::uint64_t>());
     // Compared before use: a product that overflows or is larger than the frame never allocates anything.
-    if (shape.back() != 0 && bytes > (std::uint64_t{1} << 48) / shape.back())
+    // Extents beside a zero too: readers in other languages multiply them before they see it.
+    if (shape.back() != 0 && without_zeros > (std::uint64_t{1} << 48) / shape.back())
       throw ProtocolError(fmt::format("array {} has an impossible shape", name));
     bytes *= shape.back();
+    if (shape.back() != 0) without_zeros *= shape.back();
   }
   if (bytes != frame.size)
     throw ProtocolError(fmt::format("array {} on {} should have {} bytes by its shape, but has {}", name, mesh, bytes, frame.size));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -197,9 +198,17 @@ Message advance_message(const Window& window, std::vector<Field> fields) {
   return message;
 }
 
-AdvanceRequest read_advance(const Message& message) {
+AdvanceRequest read_advance(const Message& message, const std::vector<Run::Use>& uses) {
+  const auto is_received = [&](const Array& array) {
+    return std::any_of(uses.begin(), uses.end(), [&](const Run::Use& use) {
+      return use.surface == array.mesh() && std::find(use.receives.begin(), use.receives.end(), array.name()) != use.receives.end();
+    });
+  };
+  std::vector<Field> fields;
+  for (const auto& each : message.arrays)
+    if (is_received(each)) fields.push_back({each.mesh(), each.name(), vectors(each)});
   AdvanceRequest request{value<std::int64_t>(message, message.body, "start"),
-                         value<std::int64_t>(message, message.body, "end"), read_fields(message),
+                         value<std::int64_t>(message, message.body, "end"), std::move(fields),
                          message.body.contains("estimate") && value<bool>(message, message.body, "estimate")};
   if (request.start < 0 || request.end <= request.start) throw ProtocolError("advance over a window that has no length");
   return request;

@@ -33,7 +33,8 @@ struct AdvanceRequest {
   std::vector<Field> fields;
   bool estimate = false;
 };
-AdvanceRequest read_advance(const Message& message);
+/// Reads the fields that `uses` names as received, and passes over every other array (docs/protocol.md, §7).
+AdvanceRequest read_advance(const Message& message, const std::vector<Run::Use>& uses);
 
 Message advanced_message(Advance advance);
 Advance read_advanced(const Message& message);

@@ -43,8 +43,10 @@ std::string bind_or_explain(zmq::socket_t& socket, const std::string& endpoint) 
   return socket.get(zmq::sockopt::last_endpoint);
 }
 
-Hub::Hub(zmq::context_t& context, const std::string& endpoint) : socket_(context, zmq::socket_type::router) {
-  check_endpoint(endpoint);
+Hub::Hub(zmq::context_t& context, const std::string& endpoint, const Keys* keys)
+    : gate_(keys ? std::make_unique<Gate>(context, *keys) : nullptr), socket_(context, zmq::socket_type::router) {
+  check_endpoint(endpoint, keys);
+  if (keys) use_as_coupler(socket_, endpoint, *keys);
   socket_.set(zmq::sockopt::linger, 1000);
   socket_.set(zmq::sockopt::router_mandatory, true);  // a peer that is gone is an answer, not silence
   socket_.set(zmq::sockopt::sndhwm, 0);

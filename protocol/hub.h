@@ -2,10 +2,12 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <string>
 #include <zmq.hpp>
 
+#include "protocol/keys.h"
 #include "protocol/message.h"
 
 namespace acopla::protocol {
@@ -20,7 +22,8 @@ struct Arrival {
 class Hub {
  public:
   /// Binds. @throws io::UserError when the address is in use or not allowed
-  Hub(zmq::context_t& context, const std::string& endpoint);
+  /// @param keys  of a coupler, for tcp; may be null
+  Hub(zmq::context_t& context, const std::string& endpoint, const Keys* keys = nullptr);
   const std::string& endpoint() const { return endpoint_; }  ///< with the port the system chose for tcp://…:0
 
   std::optional<Arrival> receive(std::chrono::milliseconds wait);
@@ -30,6 +33,7 @@ class Hub {
   zmq::socket_t& socket() { return socket_; }
 
  private:
+  std::unique_ptr<Gate> gate_;  // before the socket that asks it
   zmq::socket_t socket_;
   std::string endpoint_;
 };

@@ -7,13 +7,14 @@
 #include <cstdio>
 
 #include "io/results.h"
+#include "protocol/keys.h"
 #include "protocol/serve.h"
 
 namespace acopla::protocol {
 namespace {
 
 struct Arguments {
-  std::string case_file, endpoint, name, results;
+  std::string case_file, endpoint, name, results, keys = keys_of_environment();
   bool check = false, explain = false;
 };
 
@@ -80,6 +81,7 @@ int act(const Arguments& arguments, const Program& program) {
     ServeOptions options;
     options.endpoint = arguments.endpoint;
     options.name = name;
+    options.keys = arguments.keys;
     serve(*participant, options);
     return io::exit_done;
   }
@@ -94,6 +96,7 @@ int run_program(int argc, char** argv, const Program& program) {
   Arguments arguments;
   app.add_option("case", arguments.case_file, "the case file, e.g. case.toml")->required();
   auto* connect = app.add_option("--connect", arguments.endpoint, "the coupler's address, e.g. tcp://127.0.0.1:5555");
+  app.add_option("--keys", arguments.keys, "folder with participant.keys, for tcp beyond loopback (default: ACOPLA_KEYS)");
   app.add_option("--as", arguments.name, "the participant of the case that this process is");
   app.add_option("--results", arguments.results, "folder for the results when alone (must not exist)")->excludes(connect);
   app.add_flag("--check", arguments.check, "check this participant's table and the files it names, and end");

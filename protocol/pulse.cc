@@ -22,10 +22,11 @@ Message pulse_message(Kind kind, const std::string& participant) {
 
 }  // namespace
 
-PulseMonitor::PulseMonitor(zmq::context_t& context, const std::string& endpoint)
+PulseMonitor::PulseMonitor(zmq::context_t& context, const std::string& endpoint, const Keys* keys)
     : socket_(context, zmq::socket_type::router), last_turn_(Clock::now()) {
   socket_.set(zmq::sockopt::linger, 0);
   socket_.set(zmq::sockopt::maxmsgsize, std::int64_t{1} << 16);  // a pong is a hundred bytes
+  if (keys) use_as_coupler(socket_, endpoint, *keys);
   endpoint_ = bind_or_explain(socket_, endpoint);
   thread_ = std::thread([this] { run(); });
 }
@@ -86,10 +87,11 @@ void PulseMonitor::run() {
   }
 }
 
-Pulse::Pulse(zmq::context_t& context, const std::string& endpoint, std::string participant)
+Pulse::Pulse(zmq::context_t& context, const std::string& endpoint, std::string participant, const Keys* keys)
     : socket_(context, zmq::socket_type::dealer), participant_(std::move(participant)), last_ping_(Clock::now()) {
   socket_.set(zmq::sockopt::linger, 0);
   socket_.set(zmq::sockopt::sndtimeo, 0);  // without a coupler a send would wait for ever, and with it our end
+  if (keys) use_as_participant(socket_, endpoint, *keys);
   socket_.connect(endpoint);
   thread_ = std::thread([this] { run(); });
 }

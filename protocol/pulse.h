@@ -11,6 +11,8 @@
 #include <thread>
 #include <zmq.hpp>
 
+#include "protocol/keys.h"
+
 namespace acopla::protocol {
 
 inline constexpr std::chrono::milliseconds ping_interval{250};
@@ -21,7 +23,8 @@ inline constexpr std::chrono::milliseconds report_limit{10000};  ///< from the w
 class PulseMonitor {
  public:
   /// @param endpoint  to bind, e.g. the hub's with ".pulse", or tcp://127.0.0.1:* for any port
-  PulseMonitor(zmq::context_t& context, const std::string& endpoint);
+  /// @param keys  of a coupler, for tcp, whose Hub stands at the gate; may be null
+  PulseMonitor(zmq::context_t& context, const std::string& endpoint, const Keys* keys = nullptr);
   ~PulseMonitor();
   PulseMonitor(const PulseMonitor&) = delete;
   PulseMonitor& operator=(const PulseMonitor&) = delete;
@@ -48,7 +51,8 @@ class PulseMonitor {
 /// The solver's side: answers pings, and knows for how long none came.
 class Pulse {
  public:
-  Pulse(zmq::context_t& context, const std::string& endpoint, std::string participant);
+  /// @param keys  of a participant, for tcp; may be null
+  Pulse(zmq::context_t& context, const std::string& endpoint, std::string participant, const Keys* keys = nullptr);
   ~Pulse();
   Pulse(const Pulse&) = delete;
   Pulse& operator=(const Pulse&) = delete;

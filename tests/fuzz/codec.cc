@@ -32,6 +32,13 @@ std::vector<Frame> cut(const std::uint8_t* data, std::size_t size) {
   return frames;
 }
 
+// Uses that name every array, so that each is read.
+std::vector<Run::Use> uses_of(const Message& message) {
+  std::vector<Run::Use> uses;
+  for (const auto& array : message.arrays) uses.push_back({array.mesh(), {array.name()}, {}});
+  return uses;
+}
+
 void read_body(const Message& message) {
   switch (message.kind) {
     case Kind::hello:
@@ -44,7 +51,7 @@ void read_body(const Message& message) {
       read_interface(message);
       break;
     case Kind::advance:
-      read_advance(message);
+      read_advance(message, uses_of(message));
       break;
     case Kind::advanced:
       read_advanced(message);

@@ -663,7 +663,7 @@ TEST_F(RogueParticipant, ALargeMeshTravelsWhole) {
             auto answer = protocol::error_message("far enough", "advancing");
             answer.sequence = request->sequence;
             rogue.send(answer);
-            EXPECT_EQ(protocol::read_advance(*request).start, 0);
+            EXPECT_EQ(protocol::read_advance(*request, {}).start, 0);
           }),
       "far enough");
 }

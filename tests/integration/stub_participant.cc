@@ -5,6 +5,7 @@
 #include <cstring>
 #include <map>
 
+#include "protocol/keys.h"
 #include "protocol/serve.h"
 #include "tests/integration/stubs.h"
 
@@ -19,6 +20,7 @@ int serve(Stub stub, std::chrono::milliseconds pause, const stubs::Mishap& misha
   protocol::ServeOptions options;
   options.endpoint = std::getenv("ACOPLA_ENDPOINT");
   options.name = std::getenv("ACOPLA_PARTICIPANT");
+  options.keys = protocol::keys_of_environment();
   protocol::serve(stub, options);
   return 0;
 }

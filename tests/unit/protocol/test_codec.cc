@@ -205,6 +205,19 @@ TEST(Codec, AHelloOfAnotherVersionIsReadSoThatItCanBeAnswered) {
   }
 }
 
+TEST(Codec, TextIsUtf8) {
+  auto header = plain_header();
+  for (const char* text : {"ab\x7f", "\xc2\x80", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xee\x80\x80", "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf"}) {
+    header["body"] = {{"text", text}};
+    EXPECT_NO_THROW(decode(std::vector{header_of(header)})) << text;
+  }
+  // Lone continuation, cut short, overlong (2, 3, 4 bytes), surrogate, beyond U+10FFFF (RFC 3629, §3–4).
+  for (const char* text : {"\x80", "\xc2", "\xe2\x82", "\xc1\xbf", "\xe0\x9f\xbf", "\xf0\x8f\xbf\xbf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xf5\x80\x80\x80"}) {
+    header["body"] = {{"text", text}};
+    expect_refused({header_of(header)}, "text that is not UTF-8");
+  }
+}
+
 TEST(Codec, ShapesMustHoldTheirBytes) {
   const auto with_array = [](const Body& array, std::size_t bytes) {
     auto header = plain_header();
@@ -217,14 +230,18 @@ TEST(Codec, ShapesMustHoldTheirBytes) {
   auto changed = good;
   changed["shape"] = {std::uint64_t{1} << 62, 8};  // the product overflows to 0
   expect_refused(with_array(changed, 0), "an impossible shape");
-  changed["shape"] = {0, std::uint64_t{1} << 63};  // empty, however long
+  changed["shape"] = {0, 3};
   EXPECT_NO_THROW(decode(with_array(changed, 0)));
+  changed["shape"] = {0, std::uint64_t{1} << 63};  // empty, but readers elsewhere would multiply first
+  expect_refused(with_array(changed, 0), "an impossible shape");
   changed["shape"] = {std::uint64_t{1} << 63, 0};
   expect_refused(with_array(changed, 0), "an impossible shape");
   changed["shape"] = {-2, 3};
   expect_refused(with_array(changed, 48), "a shape that is not of counts");
   changed["shape"] = {2.0, 3};
   expect_refused(with_array(changed, 48), "a shape that is not of counts");
+  changed["shape"] = std::vector<int>(33, 1);
+  expect_refused(with_array(changed, 8), "an impossible shape");
   changed["shape"] = 6;
   expect_refused(with_array(changed, 48), "no list \"shape\"");
   changed = good;

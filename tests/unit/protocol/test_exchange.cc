@@ -123,13 +123,23 @@ TEST(Exchange, InterfaceThatDoesNotFitTogetherIsRefused) {
 TEST(Exchange, FieldsOfAnAdvanceSurvive) {
   const std::vector<Field> fields{{"box", "force", {{1, 2, 3}, {4, 5, 6}}},
                                   {"lid", "displacement", {}}};
-  const auto request = read_advance(trip(advance_message({3, 5, 0.3, 0.2}, fields)));
+  const std::vector<Run::Use> uses{{"box", {"force"}, {}}, {"lid", {"displacement", "velocity"}, {}}};
+  const auto request = read_advance(trip(advance_message({3, 5, 0.3, 0.2}, fields)), uses);
   EXPECT_EQ(request.start, 3);
   EXPECT_EQ(request.end, 5);
   ASSERT_EQ(request.fields.size(), 2u);
   EXPECT_EQ(request.fields[0].values[1], Vec3(4, 5, 6));
-  expect_refused(advance_message({5, 5, 0.5, 0}, {}), read_advance, "no length");
-  expect_refused(advance_message({-1, 5, 0.5, 0}, {}), read_advance, "no length");
+  const auto read = [&](const Message& message) { return read_advance(message, uses); };
+  expect_refused(advance_message({5, 5, 0.5, 0}, {}), read, "no length");
+  expect_refused(advance_message({-1, 5, 0.5, 0}, {}), read, "no length");
+}
+
+TEST(Exchange, ArraysThatNoUseNamesArePassedOver) {
+  auto message = advance_message({3, 5, 0.3, 0.2}, {{"box", "force", {{1, 2, 3}}}, {"box", "heat", {{1, 2, 3}}}, {"lid", "force", {{1, 2, 3}}}});
+  message.arrays.push_back(Array::of("label", "box", {2}, std::vector<std::uint8_t>{1, 2}));
+  const auto request = read_advance(trip(message), {{"box", {"force"}, {}}});
+  ASSERT_EQ(request.fields.size(), 1u);
+  EXPECT_EQ(request.fields[0].name, "force");
 }
 
 TEST(Exchange, ValuesKeepTheirOrder) {
