@@ -11,7 +11,20 @@
 #include <numeric>
 #include <set>
 #include <sstream>
+
+// What toml++ 3.3 asserts of a text may be wrong, e.g. of the heading [.a]; with NDEBUG it lets the compiler take it for impossible. Here it is an error of the text.
+namespace {
+struct UnexpectedText {};
+[[noreturn]] void unexpected_text() { throw UnexpectedText(); }
+}  // namespace
+#define TOML_ASSERT(expr) ((expr) ? static_cast<void>(0) : unexpected_text())
+#ifdef NDEBUG
+#undef NDEBUG
 #include <toml++/toml.h>
+#define NDEBUG
+#else
+#include <toml++/toml.h>
+#endif
 
 namespace acopla::io {
 
@@ -95,6 +108,23 @@ std::optional<std::string> nearest_word(std::string_view word, const std::vector
 Table::Table(std::shared_ptr<CaseDocument> document, const void* node, std::string name)
     : document_(std::move(document)), node_(node), name_(std::move(name)) {}
 
+// The first line that is a heading of which no key can come; 0 where there is none.
+static int line_of_bad_heading(std::string_view text) {
+  int line = 0;
+  while (!text.empty()) {
+    ++line;
+    const auto end = std::min(text.find('\n'), text.size());
+    auto words = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    const auto after = [&](std::string_view skipped) { words.remove_prefix(std::min(words.find_first_not_of(skipped), words.size())); };
+    after(" \t");
+    if (!words.starts_with('[')) continue;
+    after("[ \t");
+    if (words.empty() || !(std::isalnum(static_cast<unsigned char>(words[0])) || std::string_view("_-\"'").find(words[0]) != std::string_view::npos)) return line;
+  }
+  return 0;
+}
+
 Table Table::from_file(const std::string& path) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored))
@@ -115,6 +145,8 @@ Table Table::from_text(std::string_view text, const std::string& name) {
   } catch (const toml::parse_error& error) {
     throw UserError(document->at(error.source()),
                     fmt::format("not valid TOML: {}. See https://toml.io for the format.", error.description()));
+  } catch (const UnexpectedText&) {
+    throw UserError({name, line_of_bad_heading(text), 0}, "not valid TOML: a heading, key or value begins with a character that none begins with. See https://toml.io for the format.");
   }
   const void* root = &document->root;
   return Table(std::move(document), root, "");

@@ -63,11 +63,15 @@ class Strangers:
         while not self.stop.is_set():
             dealer = context.socket(zmq.DEALER)
             dealer.setsockopt(zmq.LINGER, 0)
+            dealer.setsockopt(zmq.SNDTIMEO, 100)  # who was turned away already has nobody to send to, and would wait for ever
             if keys:
                 dealer.curve_publickey, dealer.curve_secretkey, dealer.curve_serverkey = keys
             dealer.connect(f"tcp://{HOST}:{self.port}")
-            dealer.send_multipart(message)
             self.knocks[way] += 1
+            try:
+                dealer.send_multipart(message)
+            except zmq.Again:
+                pass
             if dealer.poll(100):
                 self.answers.append(dealer.recv_multipart())
             dealer.close()

@@ -76,6 +76,8 @@ TEST(CaseTable, NumbersThatAreNoneAreRefused) {
   expect_mistake([] { parse("x = 15").integer("x", 0, 9); }, "x = 15 is outside [0, 9].");
   expect_mistake([] { parse("x = [1, nan]").numbers("x"); }, "is not a finite number");
   expect_mistake([] { parse("x = 99999999999999999999").integer("x", 0, 9); }, "not valid TOML");
+  // Headings of which toml++ assumes that nobody writes them.
+  for (const char* heading : {"[.a]", "[[.a]]", "[ =]", "[#]"}) expect_mistake([&] { parse(std::string("x = 1\n") + heading); }, "case.toml:2");
 }
 
 TEST(CaseTable, OtherWrongTypes) {
