@@ -299,7 +299,7 @@ void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& ans
         }
     const double ratio = std::sqrt(worst);
     if (ratio <= 0.5) continue;
-    const auto found = std::find_if(account_.links().begin(), account_.links().end(), [&](const Link& link) { return link.mapping && link.about->to.text() == to; });
+    const auto found = std::find_if(account_.links().begin(), account_.links().end(), [&, &surface = to](const Link& link) { return link.mapping && link.about->to.text() == surface; });
     const Vec3& at = found->to->points[where];
     const auto text = fmt::format("at {:.6g} s the contacts on {} at ({:.4g}, {:.4g}, {:.4g}) m and the {:.3g} kg there turn by {:.2f} radians a window",
                                   case_.time(window_), to, at[0], at[1], at[2], mass[where].maxCoeff(), ratio);
