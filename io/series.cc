@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <hdf5.h>
 
 #include <array>
 #include <filesystem>
@@ -11,34 +10,12 @@
 #include <utility>
 
 #include "io/error.h"
+#include "io/hdf5_handle.h"
 
 namespace acopla::io {
 namespace {
 
 using geometry::Vec3;
-
-// An HDF5 handle that closes itself.
-class Handle {
- public:
-  using Close = herr_t (*)(hid_t);
-  Handle() = default;
-  Handle(hid_t id, Close close) : id_(id), close_(close) {}
-  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
-  Handle& operator=(Handle&& other) noexcept {
-    std::swap(id_, other.id_);
-    std::swap(close_, other.close_);
-    return *this;
-  }
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  hid_t get() const { return id_; }
-  bool valid() const { return id_ >= 0; }
-
- private:
-  hid_t id_ = -1;
-  Close close_ = nullptr;
-};
 
 // The library prints a stack of errors by itself; ours are one sentence.
 void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
