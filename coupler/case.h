@@ -101,7 +101,7 @@ struct Case {
   std::int64_t output_every = 1;  ///< windows between pictures
   bool record_motion = false;     ///< two-way: of the surfaces that answer, so that they can be replayed
   std::int64_t checkpoint_every = 0;  ///< windows; 0: none are written
-  std::string text;  ///< what it says, but for what may change when a run is resumed; where that can be asked for
+  std::string text;  ///< what the file says, but for what may change when a run is resumed (io::Table::canonical)
   LedgerLimits limits;
   std::vector<InterfaceCase> interfaces;  ///< none where a participant is alone
   std::vector<ParticipantCase> participants;

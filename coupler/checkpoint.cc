@@ -19,13 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 constexpr const char* program_version = "acopla-coupler 0.1.0";
 
-// What may change between a run and what goes on from it stands in Case::text no more.
-std::string hash(const std::string& text) {
-  std::uint64_t value = 0xcbf29ce484222325ULL;  // FNV-1a
-  for (const char c : text) value = (value ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-  return fmt::format("{:016x}", value);
-}
-
 }  // namespace
 
 Checkpoints::Checkpoints(const Case& read, const std::string& results, bool resumes) : case_(read), results_(results) {
@@ -36,7 +29,7 @@ Checkpoints::Checkpoints(const Case& read, const std::string& results, bool resu
   auto [state, info] = io::read_checkpoint(path);
   if (info.program_version != program_version)
     throw io::UserError({path, 0, 0}, fmt::format("was written by {}, this is {}. Resume with the version that wrote it.", info.program_version, program_version));
-  if (info.case_hash != hash(case_.text))
+  if (info.case_hash != io::hash_of(case_.text))
     throw io::UserError({case_.file, 0, 0}, fmt::format("is not the case that {} was run with. Of a run that is resumed only end, title, coupling.output_every "
                                                         "and coupling.checkpoint_every may change: undo the other changes, or start a new run.", results_));
   if (info.ticks >= case_.windows)
@@ -68,7 +61,7 @@ void Checkpoints::write(Crew& crew, Account& account, Scheme& scheme) {
   writer("account", account);
   scheme.write(writer);
   const auto windows = account.complete();
-  io::write_checkpoint(next + "/coupler.h5", state, {program_version, "coupler", case_.time(windows), windows, hash(case_.text)});
+  io::write_checkpoint(next + "/coupler.h5", state, {program_version, "coupler", case_.time(windows), windows, io::hash_of(case_.text)});
   if (renameat2(AT_FDCWD, next.c_str(), AT_FDCWD, folder().c_str(), RENAME_EXCHANGE) != 0 &&
       rename(next.c_str(), folder().c_str()) != 0)  // the first
     throw io::UserError({folder(), 0, 0}, fmt::format("the checkpoint cannot take its name: {}.", std::strerror(errno)));

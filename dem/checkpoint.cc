@@ -18,9 +18,7 @@ std::string description(const Scene& scene) {
   for (const auto& pair : scene.pairs) text.append(1, ' ').append(pair.laws.text());
   for (const auto& wall : scene.walls) text.append(1, ' ').append(wall.name);
   text += fmt::format(" {} {} {}", scene.inlets.size(), scene.outlets.size(), scene.keeps_ledger);
-  std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-  return fmt::format("{:016x}", hash);
+  return io::hash_of(text);
 }
 
 // The head of a state, which a run with other walls and laws can read too.

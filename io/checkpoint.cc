@@ -361,6 +361,12 @@ std::pair<State, CheckpointInfo> read_checkpoint(const std::string& path) {
   return {std::move(state), std::move(info)};
 }
 
+std::string hash_of(std::string_view text) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  return fmt::format("{:016x}", hash);
+}
+
 void check_origin(const std::string& path, const CheckpointInfo& found, const CheckpointInfo& wanted) {
   if (found.participant != wanted.participant)
     fail(path, fmt::format("this is a checkpoint of the participant \"{}\", not of \"{}\". Give each participant its own.",

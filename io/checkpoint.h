@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "io/archive.h"
@@ -32,6 +33,9 @@ void write_checkpoint(const std::string& path, const State& state, const Checkpo
 /// Reads a checkpoint and its origin. The state remembers the path for messages.
 /// @throws UserError when the file is not a checkpoint, of another format or byte order, cut off, or damaged by a single bit
 std::pair<State, CheckpointInfo> read_checkpoint(const std::string& path);
+
+/// A short name for a text, for CheckpointInfo::case_hash: the same on every machine, but no proof against malice (FNV-1a, 64 bits).
+std::string hash_of(std::string_view text);
 
 /// Refuses a checkpoint of another program version, participant or case. Hashes are compared where both are known.
 /// @throws UserError that names both
