@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "coupler/mapping/overlap.h"
 #include "coupler/mapping/search.h"
 #include "geometry/couple.h"
 
@@ -17,7 +18,7 @@ using geometry::CoupleCarrier;
 using geometry::SurfaceMesh;
 
 constexpr double round_off =
-    1e-15;  // of the surface's extent: nearer than this a point lies on its face
+    1e-14;  // of the surface's extent: nearer than this a point lies on its face
 constexpr double lost_fraction =
     1e-13;  // moment lost per force, of the extent: less than this nobody can see
 
@@ -66,47 +67,139 @@ class FacesAtNodes {
 
 }  // namespace
 
+/// The nodes nearest to a place, of a surface that need not have faces.
+class NearestNodes {
+ public:
+  explicit NearestNodes(const SurfaceMesh& surface) : surface_(surface), grid_(boxes_of(surface)) {}
+
+  /// The `count` nearest, nearest first, the lowest index of those as near; fewer where there are no more within `reach` [m].
+  std::vector<std::uint32_t> find(const Vec3& x, std::size_t count, double reach) const {
+    std::vector<std::uint32_t> found;
+    const auto distance = [&](std::uint32_t node) { return (surface_.points[node] - x).norm(); };
+    const double limit = std::min(reach, (grid_.bounds().high - x).cwiseAbs().cwiseMax((grid_.bounds().low - x).cwiseAbs()).norm());
+    for (double half = std::min(grid_.size(), limit);; half = std::min(2 * half, limit)) {
+      found.clear();
+      grid_.for_each_near(x - Vec3::Constant(half), x + Vec3::Constant(half), [&](std::uint32_t node) {
+        if (distance(node) <= half) found.push_back(node);
+      });
+      std::sort(found.begin(), found.end());
+      found.erase(std::unique(found.begin(), found.end()), found.end());
+      if (found.size() >= count || half >= limit) break;
+    }
+    std::stable_sort(found.begin(), found.end(), [&](auto a, auto b) { return distance(a) < distance(b); });
+    if (found.size() > count) found.resize(count);
+    return found;
+  }
+
+ private:
+  static std::vector<geometry::Box> boxes_of(const SurfaceMesh& surface) {
+    std::vector<geometry::Box> boxes;
+    for (const auto& point : surface.points) boxes.push_back({point, point});
+    return boxes;
+  }
+  const SurfaceMesh& surface_;
+  geometry::BucketGrid grid_;
+};
+
 /// Fills a mapping point by point.
 class Mapping::Builder {
  public:
   Builder(Mapping& mapping, const SurfaceMesh& from, const SurfaceMesh& to)
-      : mapping_(mapping), to_(to), extent_(to.extent()) {
-    if (plane(from) && plane(to)) forces_.z() = 0;
+      : mapping_(mapping), from_(from), to_(to), extent_(to.extent()), plane_(plane(from) && plane(to)) {
+    if (plane_) forces_.z() = 0;
   }
 
-  void add(std::uint32_t point, const Vec3& x, const Partner& partner) {
-    const auto nodes = to_.nodes(partner.face);
+  void by_projection(const std::vector<bool>& taking, double max_distance) {
+    const PartnerSearch search(to_);
+    for_each_point(taking, [&](std::uint32_t point, const Vec3& x) { return project(point, x, search, max_distance); });
+  }
+
+  void by_overlap(const std::vector<bool>& taking, double max_distance) {
+    const PartnerSearch search(to_);
+    const auto overlap = overlap_of(from_, to_, search, max_distance);
+    for_each_point(taking, [&](std::uint32_t point, const Vec3& x) {
+      const auto start = overlap.starts[point], size = overlap.starts[point + 1] - start;
+      if (size == 0) {
+        const bool found = project(point, x, search, max_distance);
+        if (found) ++mapping_.uncovered_;
+        return found;
+      }
+      const std::span<const std::uint32_t> nodes{overlap.nodes.data() + start, size};
+      add(point, x, nodes, {overlap.weights.data() + start, size}, nodes);
+      // Faces over those around a point may all be farther from itself than the limit.
+      const auto partner = search.nearest(x, std::numeric_limits<double>::infinity());
+      note_distance(point, partner->projection.distance);
+      return true;
+    });
+  }
+
+  void by_nearest_node(const std::vector<bool>& taking, double max_distance) {
+    const NearestNodes search(to_);
+    // As many as carry any couple: in the plane two nodes, in space three that are not on a line, and one to spare.
+    const std::size_t enough = plane_ ? 2 : 4;
+    constexpr double one = 1;
+    for_each_point(taking, [&](std::uint32_t point, const Vec3& x) {
+      const auto nearest = search.find(x, 1, max_distance);
+      if (nearest.empty()) return false;
+      // More, where some of them coincide or stand on a line.
+      auto around = search.find(x, enough, std::numeric_limits<double>::infinity());
+      const auto offset = Vec3(x - to_.points[nearest.front()]);
+      for (auto count = 2 * enough; count <= 16 * enough && loses(carrier_of(around), unit_couples(offset)); count *= 2)
+        around = search.find(x, count, std::numeric_limits<double>::infinity());
+      add(point, x, nearest, {&one, 1}, around);
+      note_distance(point, (x - to_.points[nearest.front()]).norm());
+      return true;
+    });
+  }
+
+ private:
+  template <class Place>
+  void for_each_point(const std::vector<bool>& taking, const Place& place) {
+    mapping_.starts_.reserve(from_.points.size() + 1);
+    for (std::uint32_t point = 0; point < from_.points.size(); ++point) {
+      if (taking[point] && !place(point, from_.points[point])) mapping_.unmapped_.push_back(point);
+      mapping_.starts_.push_back(mapping_.nodes_.size());
+    }
+  }
+
+  bool project(std::uint32_t point, const Vec3& x, const PartnerSearch& search, double max_distance) {
+    const auto partner = search.nearest(x, max_distance);
+    if (!partner) return false;
+    const auto nodes = to_.nodes(partner->face);
+    add(point, x, nodes, {partner->projection.weights.data(), nodes.size()}, nodes);
+    note_distance(point, partner->projection.distance);
+    return true;
+  }
+
+  /// @param carriers  of the couple, where x lies off the place that the weights give
+  void add(std::uint32_t point, const Vec3& x, std::span<const std::uint32_t> nodes, std::span<const double> weights, std::span<const std::uint32_t> carriers) {
     // What `forces` does is Σ w_k x_k, whatever the search made of it.
     Vec3 projected = Vec3::Zero();
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       // A point on a node or an edge leaves the others nothing but rounding; where the meshes match, this is most of them.
-      if (std::abs(partner.projection.weights[k]) < std::numeric_limits<double>::epsilon()) continue;
+      if (std::abs(weights[k]) < std::numeric_limits<double>::epsilon()) continue;
       mapping_.nodes_.push_back(nodes[k]);
-      mapping_.weights_.push_back(partner.projection.weights[k]);
-      projected += partner.projection.weights[k] * to_.points[nodes[k]];
+      mapping_.weights_.push_back(weights[k]);
+      projected += weights[k] * to_.points[nodes[k]];
     }
     const Vec3 offset = x - projected;
-    const double distance = offset.norm();
-    if (distance > mapping_.worst_distance_) {
-      mapping_.worst_distance_ = distance;
-      mapping_.worst_point_ = point;
-    }
-    if (distance > round_off * extent_) add_couple(point, offset, partner.face);
+    if (offset.norm() > round_off * extent_) add_couple(point, offset, carriers);
   }
 
- private:
-  void add_couple(std::uint32_t point, const Vec3& offset, std::uint32_t face) {
-    const Eigen::Matrix3d couples = cross_matrix(offset) * forces_.asDiagonal();  // of unit forces
-    const auto loses = [&](const CoupleCarrier& carrier) {
-      return (carrier.lost * couples).norm() > lost_fraction * extent_;
-    };
-    const auto nodes = to_.nodes(face);
+  void note_distance(std::uint32_t point, double distance) {
+    if (distance <= mapping_.worst_distance_) return;
+    mapping_.worst_distance_ = distance;
+    mapping_.worst_point_ = point;
+  }
+
+  void add_couple(std::uint32_t point, const Vec3& offset, std::span<const std::uint32_t> nodes) {
+    const auto couples = unit_couples(offset);
     carriers_.assign(nodes.begin(), nodes.end());
     auto carrier = carrier_of(carriers_);
-    if (loses(carrier)) {
-      spread(face);
+    if (loses(carrier, couples)) {
+      spread(nodes);
       carrier = carrier_of(carriers_);
-      ++(loses(carrier) ? mapping_.couples_lost_ : mapping_.couples_spread_);
+      ++(loses(carrier, couples) ? mapping_.couples_lost_ : mapping_.couples_spread_);
     }
     mapping_.couples_.push_back({point, carrier.compliance * couples});
     for (const auto node : carriers_) {
@@ -116,16 +209,19 @@ class Mapping::Builder {
     mapping_.couple_starts_.push_back(mapping_.couple_nodes_.size());
   }
 
+  Eigen::Matrix3d unit_couples(const Vec3& offset) const { return cross_matrix(offset) * forces_.asDiagonal(); }
+  bool loses(const CoupleCarrier& carrier, const Eigen::Matrix3d& couples) const { return (carrier.lost * couples).norm() > lost_fraction * extent_; }
+
   CoupleCarrier carrier_of(std::span<const std::uint32_t> nodes) {
     positions_.clear();
     for (const auto node : nodes) positions_.push_back(to_.points[node]);
     return geometry::couple_carrier(positions_);
   }
 
-  /// Adds the nodes of the faces that share a node with this one.
-  void spread(std::uint32_t face) {
+  /// Adds the nodes of the faces that share a node with these.
+  void spread(std::span<const std::uint32_t> given) {
     if (neighbours_.empty()) neighbours_.emplace_back(to_);
-    for (const auto node : to_.nodes(face))
+    for (const auto node : given)
       for (const auto other : neighbours_.front()[node]) {
         const auto nodes = to_.nodes(other);
         carriers_.insert(carriers_.end(), nodes.begin(), nodes.end());
@@ -135,8 +231,9 @@ class Mapping::Builder {
   }
 
   Mapping& mapping_;
-  const SurfaceMesh& to_;
+  const SurfaceMesh &from_, &to_;
   double extent_;
+  bool plane_;
   Vec3 forces_ = Vec3::Ones();  // which components a force may have
   std::vector<std::uint32_t> carriers_;
   std::vector<Vec3> positions_;
@@ -147,23 +244,18 @@ Mapping::Mapping(const SurfaceMesh& from, const SurfaceMesh& to, const MappingOp
     : to_count_(to.points.size()) {
   if (!(options.max_distance > 0))
     throw std::invalid_argument("mapping: max_distance must be above zero");
-  const auto carrying = carrying_points(from);
-  const PartnerSearch search(to);
-  Builder builder(*this, from, to);
-  starts_.reserve(from.points.size() + 1);
+  if (!options.own.empty()) check_length(options.own.size(), from.points.size(), "points of the sending surface");
+  auto taking = carrying_points(from);
   for (std::uint32_t point = 0; point < from.points.size(); ++point) {
-    const Vec3& x = from.points[point];
-    if (carrying[point]) {
-      if (!x.allFinite())
-        throw std::invalid_argument(
-            "mapping: point " + std::to_string(point) +
-            " of the sending surface has a coordinate that is not a finite number");
-      if (const auto partner = search.nearest(x, options.max_distance))
-        builder.add(point, x, *partner);
-      else
-        unmapped_.push_back(point);
-    }
-    starts_.push_back(nodes_.size());
+    if (!options.own.empty()) taking[point] = taking[point] && options.own[point];
+    if (taking[point] && !from.points[point].allFinite())
+      throw std::invalid_argument("mapping: point " + std::to_string(point) + " of the sending surface has a coordinate that is not a finite number");
+  }
+  Builder builder(*this, from, to);
+  switch (options.kind) {
+    case MappingKind::conservative: builder.by_projection(taking, options.max_distance); break;
+    case MappingKind::overlap: builder.by_overlap(taking, options.max_distance); break;
+    case MappingKind::nearest: builder.by_nearest_node(taking, options.max_distance); break;
   }
 }
 

@@ -13,19 +13,29 @@ namespace acopla::coupler {
 
 using geometry::Vec3;
 
+/// How a point's force finds the nodes that take it.
+enum class MappingKind {
+  conservative,  ///< the nearest face, by its shape functions where the point lies over it
+  overlap,       ///< all faces over the faces around the point (overlap.h); the nearest face where there is none
+  nearest        ///< the nearest node alone: for surfaces without faces, where nothing else is possible
+};
+
 struct MappingOptions {
   double max_distance;  ///< a point farther than this from every face has no partner [m]; > 0, may
                         ///< be infinite
+  MappingKind kind = MappingKind::conservative;
+  /// One value per point of `from`: 0 where the point belongs to another mapping, and neither sends nor receives here. Empty: all belong here.
+  std::span<const char> own = {};
 };
 
 /// The operators between the points of `from`, which send forces and receive motion, and the nodes
 /// of `to`, whose faces receive the forces and offer the motion. Both are built once, from the
 /// reference positions.
 ///
-/// Each point x of `from` has one partner, the face of `to` nearest to it, and on it the projected
-/// point Px = Σ w_k x_k. With H the matrix of the weights:
+/// Each point x of `from` has weights w_k at some nodes of `to`, of sum 1, and with them the place Px = Σ w_k x_k where its force
+/// arrives. Of a conservative mapping these are the shape functions of the nearest face at the point projected on it. With H the matrix of the weights:
 ///
-/// - `values` is H: what the face's shape functions say at Px. Exact for fields that the faces
+/// - `values` is H: of a conservative mapping what the face's shape functions say at Px, exact for fields that the faces
 ///   represent.
 /// - `forces` is Hᵀ and, where x ≠ Px, the couple (x − Px) × f as nodal forces that sum to zero:
 ///   f_k = w_k f + (A f) × d_k, A = J⁺ [x − Px]×, J = Σ (|d_k|² I − d_k d_kᵀ), d_k = x_k − x̄.
@@ -36,8 +46,8 @@ struct MappingOptions {
 ///   face). With `conjugate_values` it is the same for any field, and a rigid rotation reaches x
 ///   as ω × x and not as ω × Px.
 ///
-/// A face too thin to carry its couple (all nodes on a line, and the couple has a part about that
-/// line) hands it to its own nodes and those of the faces that share a node with it. Where even
+/// Nodes that cannot carry their couple (all on a line, and the couple has a part about that
+/// line) share it with those of the faces around them. Where even
 /// these cannot carry it, what they can is carried and the point counts in `couples_lost`. If all
 /// points of both surfaces lie at z = 0 the problem is plane: forces are taken to have no z
 /// component, couples are about z, and two nodes carry them.
@@ -70,9 +80,11 @@ class Mapping {
   /// Points of `from` with no face of `to` within max_distance, and which they are, ascending.
   std::size_t unmapped() const { return unmapped_.size(); }
   std::span<const std::uint32_t> unmapped_points() const { return unmapped_; }
-  /// Largest |x − Px| over the mapped points [m]; 0 without any.
+  /// Largest distance of a mapped point from its face, or node [m]; 0 without any.
   double worst_distance() const { return worst_distance_; }
-  /// The point of `from` it belongs to.
+  /// Points of a mapping by overlap over which no face lies, and which took the nearest face.
+  std::size_t uncovered() const { return uncovered_; }
+  /// The point of `from` that the worst distance belongs to.
   std::uint32_t worst_point() const { return worst_point_; }
   /// Points whose couple stands on the neighbours of its face as well.
   std::size_t couples_spread() const { return couples_spread_; }
@@ -102,6 +114,7 @@ class Mapping {
   std::vector<std::uint32_t> unmapped_;
   double worst_distance_ = 0;
   std::uint32_t worst_point_ = 0;
+  std::size_t uncovered_ = 0;
   std::size_t couples_spread_ = 0;
   std::size_t couples_lost_ = 0;
 };

@@ -39,31 +39,6 @@ SurfaceMesh turned(SurfaceMesh mesh, const Eigen::Matrix3d& rotation, const Vec3
   return mesh;
 }
 
-/// Consistent nodal forces of a uniform pressure [1 N/m² along z] on a flat grid of cells that are
-/// rectangles cut in parallel: the integrals of the shape functions, as fractions of a face's area.
-std::vector<Vec3> uniform_pressure(const SurfaceMesh& mesh) {
-  static const std::map<FaceKind, std::vector<double>> fractions{
-      {FaceKind::line2, {1. / 2, 1. / 2}},
-      {FaceKind::line3, {1. / 6, 1. / 6, 4. / 6}},
-      {FaceKind::triangle3, {1. / 3, 1. / 3, 1. / 3}},
-      {FaceKind::triangle6, {0, 0, 0, 1. / 3, 1. / 3, 1. / 3}},
-      {FaceKind::quad4, {1. / 4, 1. / 4, 1. / 4, 1. / 4}},
-      {FaceKind::quad9,
-       {1. / 36, 1. / 36, 1. / 36, 1. / 36, 4. / 36, 4. / 36, 4. / 36, 4. / 36, 16. / 36}}};
-  std::vector<Vec3> forces(mesh.points.size(), Vec3::Zero());
-  for (std::size_t face = 0; face < mesh.face_count(); ++face) {
-    const auto nodes = mesh.nodes(face);
-    const std::size_t corners = geometry::corners_of(mesh.kind(face));
-    const Vec3 along = mesh.points[nodes[1]] - mesh.points[nodes[0]];
-    const Vec3 across = mesh.points[nodes[corners - 1]] - mesh.points[nodes[0]];
-    const double area =
-        corners == 2 ? along.norm() : along.cross(across).norm() * (corners == 3 ? 0.5 : 1);
-    for (std::size_t k = 0; k < nodes.size(); ++k)
-      forces[nodes[k]].z() += area * fractions.at(mesh.kind(face))[k];
-  }
-  return forces;
-}
-
 TEST(ConservativeMapping, KeepsForceAndMomentOnNonMatchingFlatGrids) {
   for (const auto a : surface_kinds)
     for (const auto b : surface_kinds)

@@ -1,0 +1,381 @@
+#include "coupler/mapping/overlap.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <tuple>
+
+namespace acopla::coupler {
+namespace {
+
+using geometry::SurfaceMesh;
+
+constexpr double least_cosine = 0.5;   // of the angle between two faces that may cover each other
+constexpr double nearly_as_far = 0.25; // of a face's size: farther than the nearest face by this, another face is another side
+
+constexpr double least_cover = 1e-6;   // of a point's control surface: below it nothing lies over it
+
+constexpr double no_more_than_an_edge = 1e-12;  // of a face's measure: faces that only touch along an edge
+constexpr double on_the_line = 1e-12;  // over a line's length
+constexpr double almost_all = 1e-9;    // of a face: less than this is missing to round-off only
+
+/// A linear piece of a face of `from`: two or three corners, each a node or the mean of some.
+struct Piece {
+  struct Corner {
+    Vec3 at;
+    std::array<std::size_t, 4> nodes;  // of the face
+    std::size_t count;                 // of these, of equal weight
+  };
+  std::array<Corner, 3> corners;
+  std::size_t count;  // of corners: 2 in the plane, 3 in space
+};
+
+template <class Visit>
+void for_each_piece(const SurfaceMesh& surface, std::size_t face, const Visit& visit) {
+  const auto nodes = surface.nodes(face);
+  const auto corner = [&](std::size_t k) { return Piece::Corner{surface.points[nodes[k]], {k}, 1}; };
+  const auto triangle = [&](std::size_t a, std::size_t b, std::size_t c) { visit(Piece{{corner(a), corner(b), corner(c)}, 3}); };
+  switch (surface.kind(face)) {
+    case FaceKind::line2: visit(Piece{{corner(0), corner(1), corner(1)}, 2}); break;
+    case FaceKind::line3:
+      visit(Piece{{corner(0), corner(2), corner(2)}, 2});
+      visit(Piece{{corner(2), corner(1), corner(1)}, 2});
+      break;
+    case FaceKind::triangle3: triangle(0, 1, 2); break;
+    case FaceKind::triangle6:
+      triangle(0, 3, 5), triangle(3, 1, 4), triangle(5, 4, 2), triangle(3, 4, 5);
+      break;
+    case FaceKind::quad4: {
+      Piece::Corner centre{Vec3::Zero(), {0, 1, 2, 3}, 4};
+      for (const auto node : nodes) centre.at += 0.25 * surface.points[node];
+      for (std::size_t k = 0; k < 4; ++k) visit(Piece{{corner(k), corner((k + 1) % 4), centre}, 3});
+      break;
+    }
+    case FaceKind::quad9:
+      for (std::size_t k = 0; k < 4; ++k) triangle(k, 4 + k, 8), triangle(4 + k, (k + 1) % 4, 8);
+      break;
+  }
+}
+
+/// A plane of coordinates (s, t) through a piece; in two dimensions the line of it, where t says nothing.
+struct Frame {
+  Vec3 origin, s, t;
+  Vec2 operator()(const Vec3& x) const { return {s.dot(x - origin), t.dot(x - origin)}; }
+  Vec3 at(const Vec2& p) const { return origin + p[0] * s + p[1] * t; }
+};
+
+using Polygon = std::vector<Vec2>;
+
+double cross(const Vec2& a, const Vec2& b) { return a[0] * b[1] - a[1] * b[0]; }
+
+/// What of a polygon lies left of the line from a to b (Sutherland & Hodgman 1974).
+void clip(Polygon& polygon, Polygon& storage, const Vec2& a, const Vec2& b) {
+  storage.clear();
+  const auto side = [&](const Vec2& p) {
+    const double value = cross(b - a, p - a);
+    return std::abs(value) > on_the_line * (b - a).squaredNorm() ? value : 0;  // else round-off would cut an edge that lies along the line anywhere
+  };
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Vec2 &p = polygon[k], &q = polygon[(k + 1) % polygon.size()];
+    const double at_p = side(p), at_q = side(q);
+    if (at_p >= 0) storage.push_back(p);
+    if ((at_p > 0 && at_q < 0) || (at_p < 0 && at_q > 0)) storage.push_back(p + at_p / (at_p - at_q) * (q - p));
+  }
+  std::swap(polygon, storage);
+}
+
+/// Of a convex polygon; none of one with less than this area, which is round-off beside an edge.
+std::optional<Vec2> centroid(const Polygon& polygon, double least) {
+  double area = 0;
+  Vec2 moment = Vec2::Zero();
+  for (std::size_t k = 0; k + 2 < polygon.size(); ++k) {
+    const double twice = cross(polygon[k + 1] - polygon[0], polygon[k + 2] - polygon[0]);
+    area += twice;
+    moment += twice / 3 * (polygon[0] + polygon[k + 1] + polygon[k + 2]);
+  }
+  if (!(area > least)) return std::nullopt;
+  return Vec2(moment / area);
+}
+
+struct QuadraturePoint {
+  std::array<double, 3> place;  // barycentric
+  double weight;
+};
+
+// Exact for degree 2: hat function times linear shape function.
+constexpr std::array<QuadraturePoint, 3> three_points{{{{2. / 3, 1. / 6, 1. / 6}, 1. / 3}, {{1. / 6, 2. / 3, 1. / 6}, 1. / 3}, {{1. / 6, 1. / 6, 2. / 3}, 1. / 3}}};
+// Exact for degree 5 (Radon 1948): hat function times biquadratic shape function.
+const std::array<QuadraturePoint, 7> seven_points = [] {
+  const double r = std::sqrt(15.), a = (6 - r) / 21, b = (6 + r) / 21, wa = (155 - r) / 1200, wb = (155 + r) / 1200;
+  return std::array<QuadraturePoint, 7>{{{{1. / 3, 1. / 3, 1. / 3}, 9. / 40},
+                                         {{1 - 2 * a, a, a}, wa}, {{a, 1 - 2 * a, a}, wa}, {{a, a, 1 - 2 * a}, wa},
+                                         {{1 - 2 * b, b, b}, wb}, {{b, 1 - 2 * b, b}, wb}, {{b, b, 1 - 2 * b}, wb}}};
+}();
+// Gauss's three points on [0, 1], exact for degree 5.
+const std::array<std::array<double, 2>, 3> line_points = [] {
+  const double h = 0.5 * std::sqrt(0.6);
+  return std::array<std::array<double, 2>, 3>{{{0.5 - h, 5. / 18}, {0.5, 8. / 18}, {0.5 + h, 5. / 18}}};
+}();
+
+/// Gathers ∫ N_i N_k dA, face of `from` by face.
+class Integration {
+ public:
+  Integration(const SurfaceMesh& from, const SurfaceMesh& to, const PartnerSearch& search, double max_distance)
+      : from_(from), to_(to), search_(search), max_distance_(max_distance), whole_(from.points.size(), 0.0) {}
+
+  Overlap rows() {
+    for (std::size_t face = 0; face < from_.face_count(); ++face) {
+      hats_.setZero(std::ssize(from_.nodes(face)), std::ssize(from_.nodes(face)));
+      under_.clear();
+      shares_.clear();
+      for_each_piece(from_, face, [&](const Piece& piece) { add(piece); });
+      enter(from_.nodes(face));
+    }
+    // One face after another has added to a pair; the sum goes in that order, so that it does not depend on the sort.
+    std::stable_sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return std::tie(a.point, a.node) < std::tie(b.point, b.node); });
+    Overlap result;
+    result.starts.reserve(from_.points.size() + 1);
+    auto next = entries_.begin();
+    for (std::uint32_t point = 0; point < from_.points.size(); ++point) {
+      double sum = 0;
+      for (; next != entries_.end() && next->point == point; ++next) {
+        sum += next->value;
+        if (result.nodes.size() > result.starts.back() && result.nodes.back() == next->node) {
+          result.weights.back() += next->value;
+          continue;
+        }
+        result.nodes.push_back(next->node);
+        result.weights.push_back(next->value);
+      }
+      if (!(sum > least_cover * whole_[point])) {  // a hair's breadth says nothing about where a force goes
+        result.nodes.resize(result.starts.back());
+        result.weights.resize(result.starts.back());
+      }
+      for (auto k = result.starts.back(); k < result.weights.size(); ++k) result.weights[k] /= sum;
+      result.starts.push_back(result.nodes.size());
+    }
+    return result;
+  }
+
+ private:
+  struct Entry {
+    std::uint32_t point, node;
+    double value;
+  };
+
+  void add(const Piece& piece) {
+    const auto& c = piece.corners;
+    const Vec3 edge = c[1].at - c[0].at;
+    const double length = edge.norm();
+    if (!(length > 0)) return;
+    Frame frame{c[0].at, edge / length, Vec3::Zero()};
+    Vec3 normal = Vec3::Zero();
+    double size = length, measure = length;  // of the piece [m], [m²]
+    if (piece.count == 3) {
+      const Vec3 area = edge.cross(c[2].at - c[0].at);
+      if (!(area.norm() > 0)) return;
+      normal = area.normalized();
+      frame.t = normal.cross(frame.s);
+      measure = 0.5 * area.norm();
+      size = std::sqrt(2 * measure);
+    }
+    add_mass(piece, measure);
+    Vec3 middle = Vec3::Zero();
+    for (std::size_t k = 0; k < piece.count; ++k) middle += c[k].at / static_cast<double>(piece.count);
+    const auto nearest = search_.nearest(middle, max_distance_);
+    if (!nearest) return;
+    const double farthest = std::min(max_distance_, nearest->projection.distance + nearly_as_far * size);
+
+    Vec3 low = c[0].at, high = low;
+    for (std::size_t k = 1; k < piece.count; ++k) low = low.cwiseMin(c[k].at), high = high.cwiseMax(c[k].at);
+    near_.clear();
+    search_.grid().for_each_near(low - Vec3::Constant(farthest), high + Vec3::Constant(farthest), [&](std::uint32_t face) { near_.push_back(face); });
+    std::sort(near_.begin(), near_.end());
+    near_.erase(std::unique(near_.begin(), near_.end()), near_.end());
+    for (const auto face : near_) {
+      points_.clear();
+      for (const auto node : to_.nodes(face)) points_.push_back(to_.points[node]);
+      if (piece.count == 2) cover_line(piece, frame, length, face, farthest);
+      else cover(piece, frame, normal, face, farthest);
+    }
+  }
+
+  void cover_line(const Piece& piece, const Frame& frame, double length, std::uint32_t face, double farthest) {
+    const auto kind = to_.kind(face);
+    if (geometry::corners_of(kind) != 2) return;
+    const Vec3 along = points_[1] - points_[0];
+    if (!(std::abs(along.dot(frame.s)) >= least_cosine * along.norm()) || along.norm() == 0) return;
+    for_each_piece(to_, face, [&](const Piece& under) {
+      const double a = frame(under.corners[0].at)[0], b = frame(under.corners[1].at)[0];
+      const double low = std::max(0.0, std::min(a, b)), high = std::min(length, std::max(a, b));
+      if (!(high - low > no_more_than_an_edge * length)) return;
+      const auto shapes_at = [&](double s) {
+        const double share = (s - a) / (b - a);
+        return located(kind, frame, {s, 0}, (1 - share) * parameters(kind, under.corners[0]) + share * parameters(kind, under.corners[1]));
+      };
+      if (distance(shapes_at(0.5 * (low + high)), frame.at({0.5 * (low + high), 0})) > farthest) return;
+      begin(face);
+      for (const auto& [place, weight] : line_points) {
+        const double s = low + place * (high - low);
+        gather({1 - s / length, s / length, 0}, piece.count, shapes_at(s), weight * (high - low));
+      }
+      enter(piece);
+    });
+  }
+
+  void cover(const Piece& piece, const Frame& frame, const Vec3& normal, std::uint32_t face, double farthest) {
+    const auto kind = to_.kind(face);
+    if (geometry::corners_of(kind) < 3) return;
+    const std::array<Vec2, 3> corners{frame(piece.corners[0].at), frame(piece.corners[1].at), frame(piece.corners[2].at)};
+    const double whole = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    for_each_piece(to_, face, [&](const Piece& under) {
+      const Vec3 area = (under.corners[1].at - under.corners[0].at).cross(under.corners[2].at - under.corners[0].at);
+      if (!(std::abs(area.dot(normal)) >= least_cosine * area.norm()) || area.norm() == 0) return;
+      std::array<Vec2, 3> triangle;
+      for (std::size_t k = 0; k < 3; ++k) triangle[k] = frame(under.corners[k].at);
+      const double turn = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+      polygon_.assign(triangle.begin(), triangle.end());
+      if (turn < 0) std::reverse(polygon_.begin(), polygon_.end());
+      for (std::size_t k = 0; k < 3 && polygon_.size() > 2; ++k) clip(polygon_, storage_, corners[k], corners[(k + 1) % 3]);
+      if (polygon_.size() < 3) return;
+
+      const std::array<Vec2, 3> at_corners{parameters(kind, under.corners[0]), parameters(kind, under.corners[1]), parameters(kind, under.corners[2])};
+      const auto shapes_at = [&](const Vec2& p) {
+        const double first = cross(triangle[1] - p, triangle[2] - p) / turn, second = cross(triangle[2] - p, triangle[0] - p) / turn;
+        return located(kind, frame, p, first * at_corners[0] + second * at_corners[1] + (1 - first - second) * at_corners[2]);
+      };
+      const auto middle = centroid(polygon_, no_more_than_an_edge * whole);
+      if (!middle || distance(shapes_at(*middle), frame.at(*middle)) > farthest) return;
+      begin(face);
+      const auto take = [&](const Vec2& p, double weight) {
+        const double first = cross(corners[1] - p, corners[2] - p) / whole, second = cross(corners[2] - p, corners[0] - p) / whole;
+        gather({first, second, 1 - first - second}, 3, shapes_at(p), weight);
+      };
+      // A fan about the middle: which corner comes first is a matter of round-off, where two faces share an edge.
+      for (std::size_t k = 0; k < polygon_.size(); ++k) {
+        const Vec2 &a = *middle, &b = polygon_[k], &c = polygon_[(k + 1) % polygon_.size()];
+        const double half = 0.5 * cross(b - a, c - a);
+        const auto add_all = [&](const auto& rule) {
+          for (const auto& [place, weight] : rule) take(place[0] * a + place[1] * b + place[2] * c, weight * half);
+        };
+        if (kind == FaceKind::triangle3) add_all(three_points);
+        else add_all(seven_points);
+      }
+      enter(piece);
+    });
+  }
+
+  static Vec2 parameters(FaceKind kind, const Piece::Corner& corner) {
+    Vec2 mean = Vec2::Zero();
+    for (std::size_t n = 0; n < corner.count; ++n) mean += node_parameters(kind)[corner.nodes[n]] / static_cast<double>(corner.count);
+    return mean;
+  }
+
+  /// Shape functions of the face of `to` where it lies over the point p of the frame: by Newton's method from where its linear pieces have it, which
+  /// is the answer already on affine faces. Not held inside the face, whose curved edge may stand beside its straight pieces: so the result is smooth.
+  FaceValues located(FaceKind kind, const Frame& frame, const Vec2& p, Vec2 at) const {
+    auto basis = shape_basis(kind, at);
+    const bool line = geometry::corners_of(kind) == 2;
+    if (kind == FaceKind::triangle3 || kind == FaceKind::line2) return basis.value;
+    constexpr int enough = 10;  // steps; four do nearly always, as the pieces are near
+    for (int step = 0; step < enough; ++step) {
+      Vec3 x = Vec3::Zero(), by_u = x, by_v = x;
+      for (std::size_t k = 0; k < points_.size(); ++k) x += basis.value[k] * points_[k], by_u += basis.u[k] * points_[k], by_v += basis.v[k] * points_[k];
+      const Vec2 off = frame(x) - p, u{frame.s.dot(by_u), frame.t.dot(by_u)}, v{frame.s.dot(by_v), frame.t.dot(by_v)};
+      const double turn = line ? u[0] : cross(u, v);
+      if (!(std::abs(turn) > 0)) break;
+      const Vec2 change = line ? Vec2(off[0] / turn, 0) : Vec2(cross(off, v) / turn, cross(u, off) / turn);
+      if (!(change.norm() < 1)) break;  // a face folded over itself: what there is must do
+      at -= change;
+      basis = shape_basis(kind, at);
+      if (change.norm() < 1e-14) break;
+    }
+    return basis.value;
+  }
+
+  double distance(const FaceValues& shapes, const Vec3& from) const {
+    Vec3 x = -from;
+    for (std::size_t k = 0; k < points_.size(); ++k) x += shapes[k] * points_[k];
+    return x.norm();
+  }
+
+  void begin(std::uint32_t face) {
+    face_ = face;
+    for (auto& row : sums_) row.fill(0);
+  }
+  void gather(const std::array<double, 3>& hats, std::size_t corners, const FaceValues& shapes, double weight) {
+    for (std::size_t i = 0; i < corners; ++i)
+      for (std::size_t k = 0; k < points_.size(); ++k) sums_[i][k] += weight * hats[i] * shapes[k];
+  }
+  /// ∫ N_i N_j dA of the piece's hat functions.
+  void add_mass(const Piece& piece, double measure) {
+    const auto corners = static_cast<double>(piece.count);
+    const double off = measure / (corners * (corners + 1));
+    for (std::size_t a = 0; a < piece.count; ++a)
+      for (std::size_t b = 0; b < piece.count; ++b) {
+        const auto &p = piece.corners[a], &q = piece.corners[b];
+        const double value = (a == b ? 2 : 1) * off / static_cast<double>(p.count * q.count);
+        for (std::size_t m = 0; m < p.count; ++m)
+          for (std::size_t n = 0; n < q.count; ++n) hats_(static_cast<Eigen::Index>(p.nodes[m]), static_cast<Eigen::Index>(q.nodes[n])) += value;
+      }
+  }
+
+  /// ∫ N_i N_k dA of a piece and a face of `to`, to the sums of the piece's face.
+  void enter(const Piece& piece) {
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const auto node = to_.nodes(face_)[k];
+      auto found = static_cast<std::size_t>(std::find(under_.begin(), under_.end(), node) - under_.begin());
+      if (found == under_.size()) {
+        under_.push_back(node);
+        shares_.emplace_back(FaceValues{});
+      }
+      for (std::size_t i = 0; i < piece.count; ++i) {
+        const auto& corner = piece.corners[i];
+        for (std::size_t n = 0; n < corner.count; ++n) shares_[found][corner.nodes[n]] += sums_[i][k] / static_cast<double>(corner.count);
+      }
+    }
+  }
+
+  /// A face of `from` is done: its hat functions become their duals where it is covered.
+  void enter(std::span<const std::uint32_t> nodes) {
+    const auto size = std::ssize(nodes);
+    const Eigen::VectorXd wholes = hats_.rowwise().sum();
+    for (Eigen::Index i = 0; i < size; ++i) whole_[nodes[static_cast<std::size_t>(i)]] += wholes[i];
+    double covered = 0;
+    for (const auto& shares : shares_)
+      for (const double share : shares) covered += share;
+    const bool dual = std::abs(covered - wholes.sum()) <= almost_all * wholes.sum();
+    if (dual) duals_ = wholes.asDiagonal() * hats_.inverse();
+    for (std::size_t k = 0; k < under_.size(); ++k) {
+      const Eigen::VectorXd shares = Eigen::Map<const Eigen::VectorXd>(shares_[k].data(), size);
+      const Eigen::VectorXd values = dual ? Eigen::VectorXd(duals_ * shares) : shares;
+      for (Eigen::Index i = 0; i < size; ++i)
+        if (values[i] != 0) entries_.push_back({nodes[static_cast<std::size_t>(i)], under_[k], values[i]});
+    }
+  }
+
+  const SurfaceMesh &from_, &to_;
+  const PartnerSearch& search_;
+  double max_distance_;
+  std::vector<double> whole_;  // ∫ N_i dA of each point [m], [m²]
+  std::vector<std::uint32_t> near_;
+  std::vector<Vec3> points_;  // of the face of `to` under work
+  Polygon polygon_, storage_;
+  std::uint32_t face_ = 0;
+  std::array<FaceValues, 3> sums_;  // of a piece and a face of `to`, by corner and node
+  Eigen::MatrixXd hats_, duals_;    // of a face of `from`
+  std::vector<std::uint32_t> under_;  // nodes of `to` that have a share of it, and the shares by its nodes
+  std::vector<FaceValues> shares_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace
+
+Overlap overlap_of(const SurfaceMesh& from, const SurfaceMesh& to, const PartnerSearch& search, double max_distance) {
+  return Integration(from, to, search, max_distance).rows();
+}
+
+}  // namespace acopla::coupler
