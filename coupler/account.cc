@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "coupler/failure.h"
+#include "coupler/mapping/share.h"
 
 namespace acopla::coupler {
 
@@ -16,7 +17,9 @@ Account::Account(const Case& read, Crew& crew, Record& record, Quantities& quant
                  Reporter& reporter)
     : case_(read), crew_(crew), record_(record), quantities_(quantities), reporter_(reporter) {
   for (const auto& interface : case_.interfaces) link(interface);
+  share();
   for (auto& link : links_) {
+    if (link.to) map(link);
     link.centre = link.from->centroid();
     for (const auto& other : links_) link.alone = link.alone && (&other == &link || !other.mapping || !(other.about->to == link.about->to));
   }
@@ -34,11 +37,36 @@ void Account::link(const InterfaceCase& interface) {
     return;
   }
   link.to = &crew_.surface(interface.to, interface.to_at);
-  if (link.to->face_count() == 0)
-    throw io::UserError(interface.to_at, fmt::format("surface {} has no faces to receive forces.",
+  if (link.to->face_count() == 0 && interface.mapping != MappingKind::nearest)
+    throw io::UserError(interface.to_at, fmt::format("surface {} has no faces to receive forces. Give it some, or take mapping = \"nearest\".",
                                                      interface.to.text()));
-  link.mapping =
-      std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance});
+  if (link.from->face_count() == 0 && interface.mapping == MappingKind::overlap)
+    throw io::UserError(interface.from_at, fmt::format("surface {} has no faces that could lie over those of {}. Take mapping = \"conservative\".",
+                                                       interface.from.text(), interface.to.text()));
+  record_.add_surface(interface.from.text(), *link.from);
+  record_.add_surface(interface.to.text(), *link.to);
+  interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
+  links_.push_back(std::move(link));
+}
+
+// Interfaces of one table share the points of the surface they come from.
+void Account::share() {
+  for (std::size_t first = 0; first < links_.size();) {
+    std::vector<const geometry::SurfaceMesh*> receivers;
+    auto last = first;
+    while (last < links_.size() && links_[last].about->share != 0 && links_[last].about->share == links_[first].about->share) receivers.push_back(links_[last++].to);
+    if (receivers.empty()) {
+      ++first;
+      continue;
+    }
+    auto shares = share_points(*links_[first].from, receivers, case_.max_distance);
+    for (auto& own : shares) links_[first++].own = std::move(own);
+  }
+}
+
+void Account::map(Link& link) {
+  const auto& interface = *link.about;
+  link.mapping = std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance, interface.mapping, link.own});
   const auto& mapping = *link.mapping;
   if (static_cast<std::int64_t>(mapping.unmapped()) > case_.limits.unmapped) {
     const auto& point = link.from->points[mapping.unmapped_points().front()];
@@ -54,11 +82,10 @@ void Account::link(const InterfaceCase& interface) {
   }
   ledgers_.unmapped += static_cast<std::int64_t>(mapping.unmapped());
   ledgers_.worst_distance = std::max(ledgers_.worst_distance, mapping.worst_distance());
-  record_.add_surface(interface.from.text(), *link.from);
-  record_.add_surface(interface.to.text(), *link.to);
-  record_.set_mapping(links_.size(), mapping.unmapped(), mapping.worst_distance());
-  interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
-  links_.push_back(std::move(link));
+  if (mapping.uncovered() > 0)
+    reporter_.note(fmt::format("{}: {} of {} points of {} have no face of {} over those around them, and load the nearest.", interface.at.text(), mapping.uncovered(),
+                               link.from->points.size(), interface.from.text(), interface.to.text()));
+  record_.set_mapping(static_cast<std::size_t>(&link - links_.data()), mapping.unmapped(), mapping.worst_distance());
 }
 
 void Account::map_forces(const std::string& sender, protocol::Advance& advance, WindowRecord& window, Forces& received) const {
@@ -87,13 +114,26 @@ const std::vector<Vec3>& Account::arrived(std::size_t interface, const WindowRec
   return links_[interface].alone ? received.at(links_[interface].about->to.text()) : window.arrived[interface];
 }
 
+namespace {
+
+/// What of a surface's forces an interface carries.
+std::vector<Vec3> own_forces(const Link& link, const std::vector<Vec3>& forces) {
+  auto own = forces;
+  for (std::size_t k = 0; k < own.size(); ++k)
+    if (!link.own[k]) own[k].setZero();
+  return own;
+}
+
+}  // namespace
+
 void Account::balance(const std::string& sender, WindowRecord& window, const Forces& received) const {
   window.ledger.resize(links_.size());
   for (std::size_t k = 0; k < links_.size(); ++k) {
     const auto& link = links_[k];
     if (link.about->from.participant != sender) continue;
     auto& row = window.ledger[k];
-    row.sent = resultant(link.from->points, window.forces.at(link.about->from.text()), link.centre);
+    const auto& forces = window.forces.at(link.about->from.text());
+    row.sent = link.own.empty() ? resultant(link.from->points, forces, link.centre) : resultant(link.from->points, own_forces(link, forces), link.centre);
     row.received = link.mapping ? resultant(link.to->points, arrived(k, window, received), link.centre) : row.sent;
     if (link.mapping) row.loss = loss(row.sent, row.received);
   }

@@ -22,6 +22,7 @@ struct Link {
   const InterfaceCase* about = nullptr;
   const geometry::SurfaceMesh *from = nullptr, *to = nullptr;  ///< to, mapping: null where the forces are recorded only
   std::unique_ptr<Mapping> mapping;
+  std::vector<char> own;  ///< of the points of `from`, where several interfaces share them; else empty
   geometry::Vec3 centre = geometry::Vec3::Zero();  ///< of `from`, about which moments are taken [m]
   bool alone = true;                               ///< no other interface ends on `to`
 };
@@ -65,6 +66,8 @@ class Account {
 
  private:
   void link(const InterfaceCase& interface);
+  void share();
+  void map(Link& link);
   void check_limits(const WindowRecord& window) const;
 
   const Case& case_;

@@ -100,8 +100,7 @@ void read_participants(const io::Table& root, const std::optional<Substitute>& s
         "no participant: add a table with solver = \"dem\", solver = \"fem\" or command = […].");
 }
 
-SurfaceName read_surface(const io::Table& table, std::string_view key, const Case& read) {
-  const auto text = table.text(key);
+SurfaceName surface_of(const std::string& text, const io::Table& table, std::string_view key, const Case& read) {
   const auto dot = text.find('.');
   if (dot == std::string::npos || dot == 0 || dot + 1 == text.size())
     table.fail(
@@ -121,24 +120,50 @@ SurfaceName read_surface(const io::Table& table, std::string_view key, const Cas
   return name;
 }
 
-void read_interfaces(const io::Table& coupling, Case& read) {
-  for (const auto& table : coupling.list("interface")) {
-    InterfaceCase interface;
-    interface.from = read_surface(table, "from", read);
-    if (table.has("to")) interface.to = read_surface(table, "to", read);
-    interface.at = table.location();
-    interface.from_at = table.location("from");
-    interface.to_at = table.location("to");
-    if (table.choice("mapping", {"conservative", "overlap", "profile"}, "conservative") !=
-        "conservative")
-      table.fail("mapping", "is not in this version yet. Use \"conservative\".");
-    if (interface.from.participant == interface.to.participant)
-      table.fail("to", "is the participant that sends. Name another.");
-    for (const auto& other : read.interfaces)
-      if (other.from == interface.from && other.to == interface.to)
-        table.fail("repeats an interface. Remove one of the two.");
-    read.interfaces.push_back(std::move(interface));
+SurfaceName read_surface(const io::Table& table, std::string_view key, const Case& read) { return surface_of(table.text(key), table, key, read); }
+
+/// One table: an interface for each surface that `to` names.
+std::vector<InterfaceCase> read_interface(const io::Table& table, Case& read) {
+  InterfaceCase interface;
+  interface.from = read_surface(table, "from", read);
+  interface.at = table.location();
+  interface.from_at = table.location("from");
+  interface.to_at = table.location("to");
+  static const std::map<std::string, MappingKind> mappings{
+      {"conservative", MappingKind::conservative}, {"overlap", MappingKind::overlap}, {"nearest", MappingKind::nearest}};
+  interface.mapping = mappings.at(table.choice("mapping", {"conservative", "overlap", "nearest"}, "conservative"));
+  if (!table.has("to")) {
+    for (const char* key : {"mapping", "motion"})
+      if (table.has(key)) table.fail(key, "has a meaning for an interface with `to` only. Remove it.");
+    return {interface};
   }
+  if (table.has("motion") && read.scheme == SchemeKind::one_way)
+    table.fail("motion", "has a meaning where surfaces move: with scheme = \"explicit\", \"parallel\" or \"implicit\". Remove it.");
+  interface.consistent_motion = table.choice("motion", {"conjugate", "consistent"}, "conjugate") == "consistent";
+  if (table.is_text("to")) {
+    interface.to = read_surface(table, "to", read);
+    return {interface};
+  }
+  std::vector<InterfaceCase> shared;
+  for (const auto& text : table.texts("to")) {
+    interface.to = surface_of(text, table, "to", read);
+    interface.share = read.interfaces.size() + 1;
+    shared.push_back(interface);
+  }
+  if (shared.size() < 2) table.fail("to", "lists a surface. Write several, which share the points of `from`, or one without brackets.");
+  return shared;
+}
+
+void read_interfaces(const io::Table& coupling, Case& read) {
+  for (const auto& table : coupling.list("interface"))
+    for (auto& interface : read_interface(table, read)) {
+      if (interface.from.participant == interface.to.participant)
+        table.fail("to", "is the participant that sends. Name another.");
+      for (const auto& other : read.interfaces)
+        if (other.from == interface.from && other.to == interface.to)
+          table.fail("repeats an interface. Remove one of the two.");
+      read.interfaces.push_back(std::move(interface));
+    }
   if (read.interfaces.empty() && read.participants.size() > 1)
     coupling.fail(
         fmt::format("has no [[coupling.interface]], and there are {} participants. Add one with "
@@ -205,9 +230,10 @@ void read_loads(const io::Table& coupling, Case& read) {
     if (!moves) coupling.fail("scheme", "needs an interface with `to`: nobody would answer. Use \"one-way\".");
     for (std::size_t a = 0; a < read.interfaces.size(); ++a)
       for (std::size_t b = 0; b < a; ++b)
-        if (read.interfaces[a].from == read.interfaces[b].from && !read.interfaces[a].recorded_only() && !read.interfaces[b].recorded_only())
-          throw io::UserError(read.interfaces[a].from_at,
-                              fmt::format("{} would be moved by two surfaces. Split it into one surface for each.", read.interfaces[a].from.text()));
+        if (const auto &one = read.interfaces[a], &other = read.interfaces[b];
+            one.from == other.from && !one.recorded_only() && !other.recorded_only() && (one.share == 0 || one.share != other.share))
+          throw io::UserError(one.from_at, fmt::format("{} would be moved by two surfaces. Name both in one interface, to = [\"{}\", \"{}\"], so that each of "
+                                                       "its points belongs to the nearer.", one.from.text(), other.to.text(), one.to.text()));
     return;
   }
   static const std::map<std::string, Loads> known{{"history", Loads::history}, {"running_mean", Loads::running_mean}, {"mean", Loads::mean},
@@ -322,9 +348,10 @@ void resolve(const io::Table& root, std::optional<Substitute>& substitute) {
   const bool moves = root.table("coupling").text("scheme", "one-way") != "one-way";
   for (const auto& interface : root.table("coupling").list("interface")) {
     const auto add_owner = [&](const char* end, std::vector<std::string>& owners) {
-      const auto surface = interface.text(end);
-      const auto owner = surface.substr(0, surface.find('.'));
-      if (std::find(owners.begin(), owners.end(), owner) == owners.end()) owners.push_back(owner);
+      for (const auto& surface : interface.is_text(end) ? std::vector{interface.text(end)} : interface.texts(end)) {
+        const auto owner = surface.substr(0, surface.find('.'));
+        if (std::find(owners.begin(), owners.end(), owner) == owners.end()) owners.push_back(owner);
+      }
     };
     add_owner("from", senders);
     if (moves && interface.has("to")) add_owner("to", movers);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coupler/acceleration/acceleration.h"
+#include "coupler/mapping/mapping.h"
 #include "geometry/surface_mesh.h"
 #include "io/case_table.h"
 
@@ -25,6 +26,10 @@ struct SurfaceName {
 struct InterfaceCase {
   SurfaceName from, to;
   io::Location at, from_at, to_at;
+  MappingKind mapping = MappingKind::conservative;
+  bool consistent_motion = false;  ///< two-way: the motion by Mapping::values, not by the transpose of the forces
+  /// Interfaces of one table, whose `to` lists several surfaces: each point of `from` belongs to one of them. 0: not shared.
+  std::size_t share = 0;
   bool recorded_only() const { return to.participant.empty(); }
   std::string text() const {
     return recorded_only() ? from.text() + " (recorded)" : from.text() + " to " + to.text();

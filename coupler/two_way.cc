@@ -205,27 +205,37 @@ TwoWay::Motions TwoWay::moved_on(const Motions& start) const {
   return motions;
 }
 
-TwoWay::Motion TwoWay::carried(const Link& link, const Motions& motions) const {
+/// Adds to the motion of a loader's surface what an interface carries there: nothing at points that belong to another.
+void TwoWay::carry(const Link& link, const Motions& motions, Motion& moved) const {
   const auto& motion = motions.at(link.about->to.text());
-  Motion result{Vectors(link.from->points.size()), Vectors(link.from->points.size())};
-  link.mapping->conjugate_values(motion.displacement, result.displacement);
-  link.mapping->conjugate_values(motion.velocity, result.velocity);
-  return result;
+  const auto add = [&](const Vectors& values, Vectors& sum) {
+    Vectors part(link.from->points.size());
+    if (link.about->consistent_motion) link.mapping->values(values, part);
+    else link.mapping->conjugate_values(values, part);
+    if (sum.empty()) sum = std::move(part);
+    else
+      for (std::size_t k = 0; k < part.size(); ++k) sum[k] += part[k];
+  };
+  add(motion.displacement, moved.displacement);
+  add(motion.velocity, moved.velocity);
 }
 
 void TwoWay::begin_loaders(std::int64_t window, const Motions* end) {
   for (const auto& name : loaders_) {
-    std::vector<protocol::Field> fields;
+    std::map<std::string, Motion> starts, ends;
     for (const auto& link : account_.links()) {
       if (!link.mapping || link.about->from.participant != name) continue;
-      const auto& surface = link.about->from.surface;
-      auto start = carried(link, now_);
-      fields.push_back({surface, "displacement", std::move(start.displacement)});
-      fields.push_back({surface, "velocity", std::move(start.velocity)});
-      if (!end) continue;
-      auto stop = carried(link, *end);
-      fields.push_back({surface, "end_displacement", std::move(stop.displacement)});
-      fields.push_back({surface, "end_velocity", std::move(stop.velocity)});
+      carry(link, now_, starts[link.about->from.surface]);
+      if (end) carry(link, *end, ends[link.about->from.surface]);
+    }
+    std::vector<protocol::Field> fields;
+    for (auto& [surface, motion] : starts) {
+      fields.push_back({surface, "displacement", std::move(motion.displacement)});
+      fields.push_back({surface, "velocity", std::move(motion.velocity)});
+    }
+    for (auto& [surface, motion] : ends) {
+      fields.push_back({surface, "end_displacement", std::move(motion.displacement)});
+      fields.push_back({surface, "end_velocity", std::move(motion.velocity)});
     }
     crew_.begin_advance(name, window, window + 1, std::move(fields), estimates(window));
   }
@@ -284,7 +294,7 @@ void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& ans
       if (answer == answers.end()) continue;
       for (const auto& field : answer->second.fields) {
         if (field.surface != link.about->from.surface || (field.name != "stiffness" && field.name != "dashpot")) continue;
-        link.mapping->forces(field.values, part);
+        link.mapping->shares(field.values, part);
         const double factor = field.name == "stiffness" ? case_.window * case_.window : 2 * case_.window;
         for (std::size_t k = 0; k < part.size(); ++k) hold[k] += factor * part[k];
       }
@@ -313,6 +323,14 @@ void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& ans
   }
 }
 
+// A consistent motion is not the transpose of the forces: the work is that on the points which sent them.
+double TwoWay::work_at_sender(const Link& link, const WindowRecord& window, const Motions& start, const Motions& moved_to) const {
+  Motion from, to;
+  carry(link, start, from);
+  carry(link, moved_to, to);
+  return work(window.forces.at(link.about->from.text()), from.displacement, to.displacement);
+}
+
 // What the coupling makes: the work of the forces on the structure, less that on the surface that sent them, which went another way or,
 // in parallel, felt others. With `conjugate_values` the two are the same for the same motion, on surfaces that do not coincide too.
 void TwoWay::book(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const {
@@ -322,7 +340,8 @@ void TwoWay::book(WindowRecord& window, const WindowRecord& acting, const Motion
     const auto to = link.about->to.text();
     const auto& from = start.at(to).displacement;
     auto& row = window.ledger[k];
-    row.work_sent = work(account_.arrived(k, window, window.forces), from, moved_to.at(to).displacement);
+    row.work_sent = link.about->consistent_motion ? work_at_sender(link, window, start, moved_to)
+                                                  : work(account_.arrived(k, window, window.forces), from, moved_to.at(to).displacement);
     if (acting.forces.empty()) continue;  // nothing acted yet
     row.work_received = work(account_.arrived(k, acting, acting.forces), from, end.at(to).displacement);
   }

@@ -259,13 +259,17 @@ Mapping::Mapping(const SurfaceMesh& from, const SurfaceMesh& to, const MappingOp
   }
 }
 
-void Mapping::forces(std::span<const Vec3> from, std::span<Vec3> to) const {
+void Mapping::shares(std::span<const Vec3> from, std::span<Vec3> to) const {
   check_length(from.size(), from_count(), "points of the sending surface");
   check_length(to.size(), to_count_, "nodes of the receiving surface");
   std::fill(to.begin(), to.end(), Vec3::Zero());
   for (std::size_t point = 0; point < from.size(); ++point)
     for (auto k = starts_[point]; k < starts_[point + 1]; ++k)
       to[nodes_[k]] += weights_[k] * from[point];
+}
+
+void Mapping::forces(std::span<const Vec3> from, std::span<Vec3> to) const {
+  shares(from, to);
   for (std::size_t c = 0; c < couples_.size(); ++c) {
     const Vec3 turn = couples_[c].turn * from[couples_[c].point];
     for (auto k = couple_starts_[c]; k < couple_starts_[c + 1]; ++k)

@@ -65,6 +65,9 @@ class Mapping {
   /// that has any. Allocates nothing. @throws std::invalid_argument when a length is wrong
   void forces(std::span<const Vec3> from, std::span<Vec3> to) const;
 
+  /// Hᵀ without couples: of what is no force, a stiffness or a mass. Arguments as above.
+  void shares(std::span<const Vec3> from, std::span<Vec3> to) const;
+
   /// Consistent. @param to  values at the nodes of `to`, any unit; @param from  overwritten, values
   /// at the points of `from`; zero where a point has no partner. Allocates nothing. @throws
   /// std::invalid_argument when a length is wrong
