@@ -160,9 +160,10 @@ void Account::close(WindowRecord& window) {
   ledgers_.jumped += window.jumped ? 1 : 0;
   window.energy_made = ledgers_.energy_made;
   record_.write(complete_, window);
-  const double end = case_.time(complete_ + 1);
+  const double end = case_.time(complete_ + window.ticks);
   for (const auto& [name, value] : window.quantities) quantities_.add(name, end, value);
-  ++complete_;
+  complete_ += window.ticks;
+  ++rows_;
   seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   reporter_.progress(complete_, case_.windows, end, seconds_);
   check_limits(window);

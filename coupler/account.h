@@ -52,6 +52,7 @@ class Account {
   template <class Archive>
   void state(Archive& archive) {
     archive("complete", complete_);
+    archive("rows", rows_);
     archive("ledgers", ledgers_);
     for (auto& interface : interfaces_) archive("worst_loss." + interface.name, interface.worst_loss);
     archive("quantities", quantities_);
@@ -59,7 +60,8 @@ class Account {
   /// Writes the next window, and compares it with the limits. @throws Failure beyond one
   void close(WindowRecord& window);
 
-  std::int64_t complete() const { return complete_; }  ///< windows written
+  std::int64_t complete() const { return complete_; }  ///< ticks of the windows written
+  std::int64_t rows() const { return rows_; }          ///< windows written
   double seconds() const { return seconds_; }          ///< from begin() to the last of them
   const Ledgers& ledgers() const { return ledgers_; }
   const std::vector<InterfaceOutcome>& interfaces() const { return interfaces_; }
@@ -76,7 +78,7 @@ class Account {
   Quantities& quantities_;
   Reporter& reporter_;
   std::vector<Link> links_;
-  std::int64_t complete_ = 0;
+  std::int64_t complete_ = 0, rows_ = 0;
   Ledgers ledgers_;
   std::vector<InterfaceOutcome> interfaces_;
   std::chrono::steady_clock::time_point begin_;

@@ -250,18 +250,17 @@ void read_loads(const io::Table& coupling, Case& read) {
         coupling.fail(key,
                       "has no effect: no interface has a receiver. Add `to` to one, or remove it.");
   const bool by_window = read.loads == Loads::history || read.loads == Loads::running_mean;
-  const auto windows_over = [&](double fallback) {
-    const auto over = whole_windows(coupling, "over", coupling.number("over", io::positive, fallback), read.window);
-    if (over < 1) coupling.fail("over", "must be at least a window.");
-    return over;
+  // Windows in steps are as long as they come out, and these times go to the nearest.
+  const auto check_over = [&](double over) {
+    if (read.window > 0 && whole_windows(coupling, "over", over, read.window) < 1) coupling.fail("over", "must be at least a window.");
   };
+  auto& times = read.times;
   if (by_window) {
     only_for("at", "\"mean\", \"snapshot\" or \"peak\"");
     if (read.loads == Loads::history) only_for("over", "\"mean\", \"running_mean\" or \"peak\"");
-    else read.load_windows = windows_over(coupling.number("over", io::positive));
-    const double from = coupling.number("loads_from", io::non_negative, 0);
-    read.loads_from = static_cast<std::int64_t>(std::ceil(from / read.window - 1e-9));
-    if (read.loads_from >= read.windows)
+    else check_over(times.load_over = coupling.number("over", io::positive));
+    times.loads_from = coupling.number("loads_from", io::non_negative, 0);
+    if (times.loads_from >= read.end * (1 - 1e-9) || (read.window > 0 && times.loads_from > read.end - read.window * (1 - 1e-9)))
       coupling.fail("loads_from", "leaves no window to send. Choose a time before `end`.");
     return;
   }
@@ -270,11 +269,45 @@ void read_loads(const io::Table& coupling, Case& read) {
   const double at = coupling.number("at", io::positive, read.end);
   if (at > read.end * (1 + 1e-12))
     coupling.fail("at", fmt::format("= {:.10g} s is after the end, {:.10g} s.", at, read.end));
-  read.load_end = whole_windows(coupling, "at", at, read.window);
+  times.load_at = at;
+  if (read.window > 0) whole_windows(coupling, "at", at, read.window);
   // A mean is over one window unless more is asked for, a peak over all.
-  const auto over = read.loads == Loads::snapshot ? 1 : windows_over(read.loads == Loads::peak ? at : read.window);
-  if (over > read.load_end) coupling.fail("over", "reaches further back than the start.");
-  read.load_start = read.load_end - over;
+  if (read.loads == Loads::peak) times.load_over = at;
+  if (read.loads != Loads::snapshot && coupling.has("over")) times.load_over = coupling.number("over", io::positive);
+  if (times.load_over > 0) check_over(times.load_over);
+  if (times.load_over > at * (1 + 1e-12)) coupling.fail("over", "reaches further back than the start.");
+}
+
+/// "steps:N" or "auto"
+void read_window_in_steps(const io::Table& coupling, Case& read) {
+  const auto text = coupling.text("window");
+  read.in_steps.at = coupling.location("window");
+  if (text == "auto") {
+    if (read.scheme != SchemeKind::serial_explicit)
+      coupling.fail("window", "= \"auto\" finds the longest windows in which scheme = \"explicit\" is stable. Give seconds, or \"steps:N\".");
+    read.in_steps.automatic = true;
+    read.in_steps.count = 1;
+    return;
+  }
+  const std::string prefix = "steps:";
+  const auto number = text.starts_with(prefix) ? text.substr(prefix.size()) : "";
+  if (number.empty() || number.size() > 9 || number.find_first_not_of("0123456789") != std::string::npos || std::stol(number) < 1)
+    coupling.fail("window", fmt::format("= \"{}\" is no window. Write seconds, \"steps:N\" for so many steps of the particles, or \"auto\".", text));
+  read.in_steps.count = std::stol(number);
+}
+
+/// Times in windows of the length that is known now. Automatic ones begin and end in step where something falls due.
+void count_windows(Case& read) {
+  const auto& times = read.times;
+  const auto unit = read.in_steps.automatic ? WindowInSteps::longest : 1;
+  const auto count = [&](double time) { return unit * std::max<std::int64_t>(1, std::llround(std::min(time / read.window, 1e12) / static_cast<double>(unit))); };
+  read.output_every = count(times.output_every);
+  read.checkpoint_every = times.checkpoint_every > 0 ? count(times.checkpoint_every) : 0;
+  read.loads_from = std::min(static_cast<std::int64_t>(std::ceil(times.loads_from / read.window - 1e-9)), read.windows - 1);
+  read.load_end = times.load_at > 0 ? count(times.load_at) : 0;
+  const auto over = times.load_over > 0 ? count(times.load_over) : 1;
+  read.load_windows = over;
+  read.load_start = std::max<std::int64_t>(0, read.load_end - over);
 }
 
 void read_coupling(const io::Table& root, Case& read) {
@@ -287,21 +320,21 @@ void read_coupling(const io::Table& root, Case& read) {
   // A participant alone only needs to know its windows.
   const bool couples = read.participants.size() > 1 || coupling.has("interface");
   read_scheme(coupling, couples, read);
-  if (coupling.is_text("window"))
-    coupling.fail("window", "must be a number of seconds in this version, e.g. 0.05.");
-  read.window = coupling.number("window", io::positive);
-  read.windows = whole_windows(root, "end", read.end, read.window);
-  if (read.windows < 1)
-    coupling.fail("window", fmt::format("= {:.10g} s is longer than the run of {:.10g} s.",
-                                        read.window, read.end));
+  if (coupling.is_text("window")) {
+    read_window_in_steps(coupling, read);
+  } else {
+    read.window = coupling.number("window", io::positive);
+    read.windows = whole_windows(root, "end", read.end, read.window);
+    if (read.windows < 1)
+      coupling.fail("window", fmt::format("= {:.10g} s is longer than the run of {:.10g} s.",
+                                          read.window, read.end));
+  }
   read.max_distance = couples ? coupling.number("max_distance", io::positive)
                               : coupling.number("max_distance", io::positive, read.max_distance);
   read.start_limit = coupling.number("start_limit", io::positive, 60);
   // About twenty pictures are enough to see a run and small beside its series.
-  const double every = coupling.number("output_every", io::positive, read.end / 20);
-  read.output_every = std::max<std::int64_t>(1, std::llround(std::min(every / read.window, 1e12)));
-  if (const auto pause = coupling.optional_number("checkpoint_every", io::positive))
-    read.checkpoint_every = std::max<std::int64_t>(1, std::llround(std::min(*pause / read.window, 1e12)));
+  read.times.output_every = coupling.number("output_every", io::positive, read.end / 20);
+  read.times.checkpoint_every = coupling.optional_number("checkpoint_every", io::positive).value_or(0);
   const auto limits = coupling.table_or_empty("limits");
   read.limits.force_loss = limits.number("force_loss", io::non_negative, read.limits.force_loss);
   read.limits.moment_loss = limits.number("moment_loss", io::non_negative, read.limits.moment_loss);
@@ -312,6 +345,7 @@ void read_coupling(const io::Table& root, Case& read) {
   if (read.scheme != SchemeKind::one_way) read.limits.energy_made = limits.optional_number("energy_made", io::non_negative);
   read_interfaces(coupling, read);
   read_loads(coupling, read);
+  if (read.window > 0) count_windows(read);
 }
 
 void read_expectations(const io::Table& root, Case& read) {
@@ -380,6 +414,13 @@ std::string ParticipantCase::program() const {
   return std::filesystem::path(command.front()).filename().string();
 }
 
+void Case::divide(double step) {
+  const auto unit = in_steps.automatic ? WindowInSteps::longest : 1;
+  windows = unit * std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(end / (step * static_cast<double>(in_steps.count * unit)) * (1 - 1e-9))));
+  window = end / static_cast<double>(windows);
+  count_windows(*this);
+}
+
 const ParticipantCase* Case::find(const std::string& participant) const {
   for (const auto& candidate : participants)
     if (candidate.name == participant) return &candidate;
@@ -423,7 +464,7 @@ Case read_case(const io::Table& root, const std::optional<Substitute>& substitut
   read_expectations(root, read);
   root.reject_unknown();
   read.text = root.canonical({"title", "end", "coupling.output_every", "coupling.checkpoint_every"}) +
-              fmt::format(" {} {}", read.load_start, read.load_end);  // of which the end is the default
+              fmt::format(" {:.17g} {:.17g}", read.times.load_at, read.times.load_over);  // of which the end is the default
   return read;
 }
 

@@ -87,12 +87,23 @@ struct Expectation {
   io::Location where;
 };
 
+/// How long a window is, where the case does not say it in seconds but in steps of the participant with the shortest.
+struct WindowInSteps {
+  std::int64_t count = 0;  ///< 0: the window is given in seconds
+  bool automatic = false;  ///< as many as are stable, from one up to `longest`; a tick is then a step
+  io::Location at;
+  /// Ticks of the longest window. Messages are then a few percent of the steps' time, and a first contact is not missed by much.
+  static constexpr std::int64_t longest = 64;
+};
+
 struct Case {
   std::string file, title;
   int dimension = 3;
   geometry::Vec3 gravity = geometry::Vec3::Zero();
-  double end = 0, window = 0;  ///< [s]
-  std::int64_t windows = 0;
+  double end = 0;               ///< [s]
+  WindowInSteps in_steps;
+  double window = 0;            ///< [s], and a tick; 0 until divide() where it is in steps
+  std::int64_t windows = 0;     ///< of that length
   SchemeKind scheme = SchemeKind::one_way;
   ImplicitSettings implicit;
   bool allows_unstable = false;  ///< explicit schemes
@@ -106,6 +117,10 @@ struct Case {
   std::int64_t output_every = 1;  ///< windows between pictures
   bool record_motion = false;     ///< two-way: of the surfaces that answer, so that they can be replayed
   std::int64_t checkpoint_every = 0;  ///< windows; 0: none are written
+  /// Times [s] that divide() turns into windows.
+  struct Times {
+    double output_every = 0, checkpoint_every = 0, loads_from = 0, load_at = 0, load_over = 0;
+  } times;
   std::string text;  ///< what the file says, but for what may change when a run is resumed (io::Table::canonical)
   LedgerLimits limits;
   std::vector<InterfaceCase> interfaces;  ///< none where a participant is alone
@@ -119,6 +134,8 @@ struct Case {
   double time(std::int64_t windows_done) const {
     return static_cast<double>(windows_done) * window;
   }
+  /// Makes windows of so many steps of this length [s], which it shortens until the end is a whole number of them.
+  void divide(double step);
   const ParticipantCase* find(const std::string& participant) const;
   bool sends(const std::string& participant) const;
   bool receives(const std::string& participant) const;

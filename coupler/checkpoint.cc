@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 
@@ -32,16 +33,27 @@ Checkpoints::Checkpoints(const Case& read, const std::string& results, bool resu
   if (info.case_hash != io::hash_of(case_.text))
     throw io::UserError({case_.file, 0, 0}, fmt::format("is not the case that {} was run with. Of a run that is resumed only end, title, coupling.output_every "
                                                         "and coupling.checkpoint_every may change: undo the other changes, or start a new run.", results_));
-  if (info.ticks >= case_.windows)
-    throw io::UserError({case_.file, 0, 0}, fmt::format("ends at {:.6g} s, and the checkpoint in {} is of {:.6g} s: nothing is left to compute. Raise end to go on.",
-                                                        case_.end, results_, info.time));
   state_ = std::move(state);
   windows_ = info.ticks;
+  time_ = info.time;
+  io::StateReader reader(state_);
+  reader("rows", rows_);
+  if (case_.window > 0) check();  // before anybody is waited for
+}
+
+void Checkpoints::check() const {
+  if (windows_ >= case_.windows)
+    throw io::UserError({case_.file, 0, 0}, fmt::format("ends at {:.6g} s, and the checkpoint in {} is of {:.6g} s: nothing is left to compute. Raise end to go on.",
+                                                        case_.end, results_, time_));
+  if (std::abs(case_.time(windows_) - time_) > 1e-9 * time_)
+    throw io::UserError(case_.in_steps.at, fmt::format("gives windows of {:.10g} s, those of the run in {} are of {:.10g} s. Give that many seconds, and an end that is a whole "
+                                                       "number of them.", case_.window, results_, time_ / static_cast<double>(windows_)));
 }
 
 void Checkpoints::resume(Crew& crew, Account& account, Scheme& scheme) {
   crew.resume(folder());
   io::StateReader reader(state_);
+  reader("rows", rows_);
   reader("crew", crew);
   reader("account", account);
   scheme.read(reader);
@@ -57,6 +69,8 @@ void Checkpoints::write(Crew& crew, Account& account, Scheme& scheme) {
   crew.checkpoint(next);
   io::State state;
   io::StateWriter writer(state);
+  auto rows = account.rows();
+  writer("rows", rows);
   writer("crew", crew);
   writer("account", account);
   scheme.write(writer);

@@ -21,8 +21,11 @@ class Checkpoints {
   /// @param resumes  goes on from the checkpoint of `results`. @throws io::UserError when there is none, or it is of another case
   Checkpoints(const Case& read, const std::string& results, bool resumes);
 
-  /// Windows that the run resumes after; 0 for a run from its beginning.
+  /// Ticks, and windows, that the run resumes after; 0 for a run from its beginning.
   std::int64_t windows() const { return windows_; }
+  std::int64_t rows() const { return rows_; }
+  /// Once the windows' length is known. @throws io::UserError when the checkpoint has another, or nothing is left to compute
+  void check() const;
   /// Everybody returns to the checkpoint.
   void resume(Crew& crew, Account& account, Scheme& scheme);
   /// A scene that asks for none pays for none.
@@ -35,7 +38,8 @@ class Checkpoints {
 
   const Case& case_;
   std::string results_;
-  std::int64_t windows_ = 0;
+  std::int64_t windows_ = 0, rows_ = 0;
+  double time_ = 0;  // [s]
   io::State state_;
 };
 

@@ -33,10 +33,11 @@ std::unique_ptr<Scheme> scheme_of(const Case& read, Crew& crew, Account& account
   return std::make_unique<TwoWay>(read, crew, account, reporter);
 }
 
-void compute(const Case& read, Crew& crew, const Coupler::Options& options, Checkpoints& checkpoints, Reporter& reporter,
+void compute(Case& read, Crew& crew, const Coupler::Options& options, Checkpoints& checkpoints, Reporter& reporter,
              Stages& stages, std::chrono::steady_clock::time_point begin) {
   crew.assemble();
-  stages.record.emplace(read, options.results, checkpoints.windows());
+  if (options.resumes) checkpoints.check();
+  stages.record.emplace(read, options.results, checkpoints.rows(), checkpoints.windows());
   auto& account = stages.account.emplace(read, crew, *stages.record, stages.quantities, reporter);
   stages.scheme = scheme_of(read, crew, account, reporter);
   if (options.resumes) checkpoints.resume(crew, account, *stages.scheme);
@@ -63,7 +64,7 @@ int exit_code_of(Failure::Cause cause) {
 }
 
 // Runs the stages and turns whatever ends them early into words.
-void attempt(const Case& read, Crew& crew, const Coupler::Options& options, Checkpoints& checkpoints, Reporter& reporter,
+void attempt(Case& read, Crew& crew, const Coupler::Options& options, Checkpoints& checkpoints, Reporter& reporter,
              Stages& stages, std::chrono::steady_clock::time_point begin, Outcome& outcome) {
   try {
     compute(read, crew, options, checkpoints, reporter, stages, begin);
@@ -90,8 +91,9 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
   outcome.participants = crew.outcomes();
   outcome.quantities = stages.quantities.last();
   if (stages.account) {
-    outcome.windows = stages.account->complete();
-    outcome.reached = outcome.windows == read.windows ? read.end : read.time(outcome.windows);
+    const auto complete = stages.account->complete();
+    outcome.windows = stages.account->rows();
+    outcome.reached = complete == read.windows ? read.end : read.time(complete);
     outcome.seconds_windows = stages.account->seconds();
     outcome.ledgers = stages.account->ledgers();
     outcome.interfaces = stages.account->interfaces();

@@ -32,7 +32,7 @@ class Coupler {
 
  private:
   zmq::context_t& context_;
-  const Case& case_;
+  Case case_;  // of which the windows may be known only once the participants are there
   Options options_;
   Reporter& reporter_;
 };

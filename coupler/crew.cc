@@ -40,7 +40,7 @@ std::string printable(std::string text) {
 
 }  // namespace
 
-Crew::Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
+Crew::Crew(zmq::context_t& context, const std::string& endpoint, Case& read,
            const std::string& results, Reporter& reporter, Outside* outside, bool resumes,
            const protocol::Keys* keys)
     : case_(read),
@@ -64,6 +64,11 @@ Crew::Crew(zmq::context_t& context, const std::string& endpoint, const Case& rea
 }
 
 void Crew::assemble() {
+  while (case_.window == 0) {
+    const auto here = [](const auto& entry) { return entry.second.replay || entry.second.phase == Member::Phase::introduced; };
+    if (std::all_of(members_.begin(), members_.end(), here)) divide();
+    else turn(tick);
+  }
   for (auto& [name, member] : members_)
     if (member.replay) start_replay(member);
   while (!all_are(Member::Phase::idle)) turn(tick);
@@ -280,11 +285,32 @@ void Crew::admit(const std::string& peer, const Message& message) {
     fail(member, why);
   }
   member.peer = peer;
+  member.step = hello.introduction.step;
+  member.saves = std::find(can.begin(), can.end(), "save") != can.end();
   if (member.outcome.solver.empty()) member.outcome.solver = hello.introduction.solver;
+  if (case_.window > 0) welcome(member);
+  else enter(member, Member::Phase::introduced, "waiting for the others' hellos");
+}
+
+void Crew::welcome(Member& member) {
   enter(member, Member::Phase::starting, "starting");
-  pulse_.expect(hello.participant);
-  if (!hub_.send(peer, protocol::welcome_message(run_for(*member.about), pulse_.endpoint())))
+  pulse_.expect(member.about->name);
+  if (!hub_.send(member.peer, protocol::welcome_message(run_for(*member.about), pulse_.endpoint())))
     fail(member, "is gone right after its hello");
+}
+
+// Everybody has said hello: the shortest step that somebody named divides the run.
+void Crew::divide() {
+  double step = 0;
+  for (const auto& [name, member] : members_)
+    if (member.step > 0 && (step == 0 || member.step < step)) step = member.step;
+  if (step == 0)
+    throw io::UserError(case_.in_steps.at, "coupling.window is in steps, and no participant here says how long its steps are (dem does). Give seconds.");
+  case_.divide(step);
+  reporter_.note(case_.in_steps.automatic ? fmt::format("a step is {:.6g} s; windows are of 1 to {} of them.", case_.window, WindowInSteps::longest)
+                                          : fmt::format("windows of {:.6g} s, {} steps each.", case_.window, case_.in_steps.count));
+  for (auto& [name, member] : members_)
+    if (!member.replay) welcome(member);
 }
 
 void Crew::refuse(const std::string& peer, const std::string& why) {

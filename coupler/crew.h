@@ -32,7 +32,8 @@ class Crew {
  public:
   /// Binds the hub and the pulse. @param outside may be null. @throws io::UserError when the
   /// address is taken
-  Crew(zmq::context_t& context, const std::string& endpoint, const Case& read,
+  /// @param read  whose windows it divides, where they are in steps, once everybody has said how long its steps are
+  Crew(zmq::context_t& context, const std::string& endpoint, Case& read,
        const std::string& results, Reporter& reporter, Outside* outside, bool resumes = false,
        const protocol::Keys* keys = nullptr);
 
@@ -46,6 +47,8 @@ class Crew {
   struct Initial {
     std::vector<geometry::Vec3> displacement, velocity, mass;
   };
+  /// A participant can return to the start of a window.
+  bool saves(const std::string& participant) const { return members_.at(participant).saves; }
   const Initial& initial(const SurfaceName& name) const { return members_.at(name.participant).initial.at(name.surface); }
 
   /// Everybody named remembers its state, or returns to it. All at once; done when all have answered. @throws Failure, Interrupted
@@ -91,6 +94,7 @@ class Crew {
     std::string peer;                // address, once it said hello
     enum class Phase {
       absent,
+      introduced,  // waits for the others' hellos, since its welcome says how long windows are
       starting,
       idle,
       advancing,
@@ -99,6 +103,8 @@ class Crew {
       finished
     } phase = Phase::absent;
     std::string state = "not connected";
+    double step = 0;     // the longest it takes [s]; 0: it does not say
+    bool saves = false;
     std::uint64_t sequence = 0;
     std::map<std::string, geometry::SurfaceMesh> surfaces;
     std::map<std::string, Initial> initial;
@@ -112,6 +118,8 @@ class Crew {
   void hear(protocol::Arrival arrival);
   void hear_member(Member& member, const protocol::Message& message);
   void hear_stranger(const protocol::Arrival& arrival);
+  void welcome(Member& member);
+  void divide();
   void admit(const std::string& peer, const protocol::Message& message);
   void refuse(const std::string& peer, const std::string& why);
   void take_surfaces(Member& member, std::vector<protocol::Surface> surfaces);
@@ -128,7 +136,7 @@ class Crew {
   bool all_are(Member::Phase phase) const;
   [[noreturn]] void fail(const Member& member, const std::string& message) const;
 
-  const Case& case_;
+  Case& case_;
   std::string results_;
   bool resumes_;
   Reporter& reporter_;

@@ -9,12 +9,12 @@ namespace acopla::coupler {
 
 using geometry::Vec3;
 
-Record::Record(const Case& read, const std::string& folder, std::int64_t resumes_after)
+Record::Record(const Case& read, const std::string& folder, std::int64_t rows, std::int64_t resumes_after)
     : case_(read), folder_(folder), resumes_after_(resumes_after), mapping_(read.interfaces.size(), {0, 0.0}) {
   if (folder_.empty()) return;
   std::filesystem::create_directories(folder_ + "/surfaces");
   const auto file = folder_ + "/interface.h5";
-  series_ = resumes_after_ > 0 ? std::make_unique<io::SeriesWriter>(file, static_cast<std::size_t>(resumes_after_)) : std::make_unique<io::SeriesWriter>(file);
+  series_ = resumes_after_ > 0 ? std::make_unique<io::SeriesWriter>(file, static_cast<std::size_t>(rows)) : std::make_unique<io::SeriesWriter>(file);
 }
 
 void Record::add_surface(const std::string& name, const geometry::SurfaceMesh& mesh) {
@@ -49,7 +49,7 @@ void Record::write(std::int64_t index, const WindowRecord& window) {
   pending_.emplace_back(index, window);
   for (const auto& [name, force] : window.forces) pending_values_ += force.size();
   for (const auto& [name, motion] : window.motion) pending_values_ += 2 * motion.displacement.size();
-  if (index + 1 < case_.windows && pending_values_ < most_values && std::chrono::steady_clock::now() - written_ < pause) return;
+  if (index + window.ticks < case_.windows && pending_values_ < most_values && std::chrono::steady_clock::now() - written_ < pause) return;
   write_pending();
 }
 
@@ -63,7 +63,7 @@ void Record::write_pending() {
 }
 
 void Record::append(std::int64_t index, const WindowRecord& window) {
-  series_->begin_window(case_.time(index), case_.time(index + 1));
+  series_->begin_window(case_.time(index), case_.time(index + window.ticks));
   for (const auto& [name, force] : window.forces) series_->add_field(name, "force", force);
   for (const auto& [name, motion] : window.motion) {
     series_->add_field(name, "displacement", motion.displacement);
@@ -72,9 +72,9 @@ void Record::append(std::int64_t index, const WindowRecord& window) {
   for (const auto& [name, value] : window.quantities)
     series_->add_scalar("quantities/" + name, value);
   write_ledger(window);
-  const auto complete = index + 1;
-  if (complete % case_.output_every == 0 || complete == case_.windows)
-    for (const auto& [name, force] : window.forces) write_picture(index, name, force);
+  const auto complete = index + window.ticks;
+  if (complete / case_.output_every > index / case_.output_every || complete == case_.windows)
+    for (const auto& [name, force] : window.forces) write_picture(complete, name, force);
 }
 
 void Record::write_ledger(const WindowRecord& window) {
@@ -113,13 +113,13 @@ void Record::write_ledger(const WindowRecord& window) {
   series_->add_scalar("ledger/jumped", window.jumped ? 1 : 0);
 }
 
-void Record::write_picture(std::int64_t index, const std::string& surface,
+void Record::write_picture(std::int64_t complete, const std::string& surface,
                            const std::vector<Vec3>& force) {
   io::PointData data{"force", 3, {}};
   for (const auto& f : force) data.values.insert(data.values.end(), f.data(), f.data() + 3);
-  const auto file = fmt::format("{}/surfaces/{}_{:05}.vtp", folder_, surface, index + 1);
+  const auto file = fmt::format("{}/surfaces/{}_{:05}.vtp", folder_, surface, complete);
   io::write_surface(file, surfaces_.at(surface), {data});
-  pictures_.at(surface).add(case_.time(index + 1), file);
+  pictures_.at(surface).add(case_.time(complete), file);
 }
 
 }  // namespace acopla::coupler

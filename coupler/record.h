@@ -29,6 +29,7 @@ struct LedgerRow {
 
 /// Everything of one window, gathered until all participants are through it.
 struct WindowRecord {
+  std::int64_t ticks = 1;                                     ///< its length
   std::vector<LedgerRow> ledger;                              ///< one per interface of the case
   std::map<std::string, std::vector<geometry::Vec3>> forces;  ///< "grains.box" → one per point [N]
   std::vector<std::vector<geometry::Vec3>> arrived;  ///< per interface, where several end on one surface: its part there [N]
@@ -47,8 +48,8 @@ struct WindowRecord {
 class Record {
  public:
   /// Writes into `folder`, or nothing at all where it is empty. @throws io::UserError
-  /// @param resumes_after  windows that a run before has written there and that stay
-  Record(const Case& read, const std::string& folder, std::int64_t resumes_after = 0);
+  /// @param rows, resumes_after  windows that a run before has written there and that stay, and their ticks
+  Record(const Case& read, const std::string& folder, std::int64_t rows = 0, std::int64_t resumes_after = 0);
   void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);
   /// How a surface that answers begins.
   void set_initial(const std::string& surface, std::span<const geometry::Vec3> displacement, std::span<const geometry::Vec3> velocity);
@@ -57,7 +58,7 @@ class Record {
   ~Record();
   Record(const Record&) = delete;
   Record& operator=(const Record&) = delete;
-  /// Appends window `index`, which must follow the last one. The file is written and flushed at once where windows are long, and else some
+  /// Appends the window from tick `index` on, which must follow the last one. The file is written and flushed at once where windows are long, and else some
   /// times a second, in one go: a flush costs more than a short window, and between two of them the file stays whole.
   void write(std::int64_t index, const WindowRecord& window);
   void flush() { write_pending(); }
@@ -66,7 +67,7 @@ class Record {
   void write_pending();
   void append(std::int64_t index, const WindowRecord& window);
   void write_ledger(const WindowRecord& window);
-  void write_picture(std::int64_t index, const std::string& surface,
+  void write_picture(std::int64_t complete, const std::string& surface,
                      const std::vector<geometry::Vec3>& force);
 
   const Case& case_;

@@ -36,7 +36,7 @@ double work(const std::vector<Vec3>& forces, const std::vector<Vec3>& from, cons
 }  // namespace
 
 TwoWay::TwoWay(const Case& read, Crew& crew, Account& account, Reporter& reporter)
-    : case_(read), crew_(crew), account_(account), reporter_(reporter) {
+    : case_(read), crew_(crew), account_(account), reporter_(reporter), stability_(crew, account), span_(read) {
   for (const auto& participant : case_.participants) (case_.receives(participant.name) ? structures_ : loaders_).push_back(participant.name);
   for (const auto& link : account_.links()) {
     if (!link.mapping) continue;
@@ -46,8 +46,10 @@ TwoWay::TwoWay(const Case& read, Crew& crew, Account& account, Reporter& reporte
     motion.displacement = initial.displacement.empty() ? none : initial.displacement;
     motion.velocity = initial.velocity.empty() ? none : initial.velocity;
     account_.set_initial(link.about->to.text(), motion.displacement, motion.velocity);
-    if (case_.scheme != SchemeKind::serial_implicit && !initial.mass.empty()) masses_[link.about->to.text()] = initial.mass;
   }
+  if (case_.in_steps.automatic && stability_.silent())
+    throw io::UserError(case_.in_steps.at, "coupling.window = \"auto\" needs structures in motion that know what a sudden force moves (fem with analysis = \"dynamic\" "
+                                           "does). Give seconds, or \"steps:N\".");
   if (case_.scheme == SchemeKind::serial_implicit) acceleration_ = make_acceleration(case_.implicit.acceleration);
 }
 
@@ -69,6 +71,7 @@ void TwoWay::state(Archive& archive) {
     archive("velocity." + surface, motion.velocity);
   }
   archive("warned", warned_);
+  archive("span", span_);
   if (case_.scheme == SchemeKind::parallel_explicit)
     for (const auto& link : account_.links()) {
       if (!link.mapping) continue;
@@ -87,16 +90,46 @@ template void TwoWay::state(io::StateReader&);
 void TwoWay::step_serially(WindowRecord& window) {
   Forces forces;
   Motions end;
-  if (!begun_) begin_loaders(window_, nullptr);
-  gather(loaders_.size(), window, forces, end);
+  if (!begun_) begin_next(window_);
+  load(window, forces, end);
   begin_structures(std::move(forces));
   balance(window);
   Forces none;
   gather(structures_.size(), window, none, end);
   const auto start = std::exchange(now_, std::move(end));
-  begun_ = window_ + 1 < std::min(case_.windows, case_.next_checkpoint(window_));
-  if (begun_) begin_loaders(window_ + 1, nullptr);
-  book(window, window, start, moved_on(start), now_);
+  const auto moved = moved_on(start);
+  const auto next = window_ + window.ticks;
+  begun_ = next < std::min(case_.windows, case_.next_checkpoint(window_));
+  span_.go_on(stability_, next);
+  if (begun_) begin_next(next);
+  book(window, window, start, moved, now_);
+}
+
+// A scene pays for keeping its state where its windows find their length by themselves, and only while a first contact may be too stiff for it.
+void TwoWay::begin_next(std::int64_t window) {
+  if (span_.exposed() && std::all_of(loaders_.begin(), loaders_.end(), [&](const auto& name) { return crew_.saves(name); })) {
+    crew_.save(loaders_);
+    saved_ = true;
+  }
+  begin_loaders(window, nullptr);
+}
+
+// The loaders' forces, of a window that is taken back while it was too long for the contacts it met: the structures know nothing of it yet.
+void TwoWay::load(WindowRecord& window, Forces& forces, Motions& end) {
+  while (true) {
+    gather(loaders_.size(), window, forces, end);
+    window.ticks = span_.ticks();
+    const auto pushes = [](const auto& surface) { return size_of(surface.second) > 0; };
+    const bool met = std::any_of(forces.begin(), forces.end(), pushes);
+    if (!saved_ || !span_.too_long(stability_, met)) break;
+    crew_.restore(loaders_);
+    span_.shorten(stability_, met);
+    window = {};
+    forces.clear();
+    begin_loaders(window_, nullptr);
+  }
+  saved_ = false;
+  if (estimates(window_)) check_stability();
 }
 
 void TwoWay::step_in_parallel(WindowRecord& window) {
@@ -105,6 +138,7 @@ void TwoWay::step_in_parallel(WindowRecord& window) {
   begin_structures(last_.forces);
   begin_loaders(window_, nullptr);
   gather(loaders_.size() + structures_.size(), window, forces, end);
+  if (estimates(window_)) check_stability();
   balance(window);
   book(window, last_, now_, moved_on(now_), end);
   now_ = std::move(end);
@@ -201,7 +235,7 @@ void TwoWay::give_up(const std::vector<double>& residuals, double force_change) 
 TwoWay::Motions TwoWay::moved_on(const Motions& start) const {
   auto motions = start;
   for (auto& [surface, motion] : motions)
-    for (std::size_t k = 0; k < motion.displacement.size(); ++k) motion.displacement[k] += case_.window * motion.velocity[k];
+    for (std::size_t k = 0; k < motion.displacement.size(); ++k) motion.displacement[k] += span_.length() * motion.velocity[k];
   return motions;
 }
 
@@ -237,7 +271,7 @@ void TwoWay::begin_loaders(std::int64_t window, const Motions* end) {
       fields.push_back({surface, "end_displacement", std::move(motion.displacement)});
       fields.push_back({surface, "end_velocity", std::move(motion.velocity)});
     }
-    crew_.begin_advance(name, window, window + 1, std::move(fields), estimates(window));
+    crew_.begin_advance(name, window, window + span_.ticks(), std::move(fields), estimates(window));
   }
 }
 
@@ -250,7 +284,7 @@ void TwoWay::begin_structures(Forces forces) {
       const auto found = forces.find(surface);
       fields.push_back({surface.substr(dot + 1), "force", found != forces.end() ? std::move(found->second) : Vectors(motion.displacement.size(), Vec3::Zero())});
     }
-    crew_.begin_advance(name, window_, window_ + 1, std::move(fields));
+    crew_.begin_advance(name, window_, window_ + span_.ticks(), std::move(fields));
   }
 }
 
@@ -275,52 +309,40 @@ void TwoWay::gather(std::size_t answers, WindowRecord& window, Forces& forces, M
     }
   }
   for (const auto& [surface, values] : forces) window.forces[surface] = values;
-  if (estimates(window_)) check_stability(came);
+  if (estimates(window_)) stability_.measure(came);
 }
 
 void TwoWay::balance(WindowRecord& window) const {
   for (const auto& name : loaders_) account_.balance(name, window, window.forces);
 }
 
-// Contacts come and go slowly beside windows.
-bool TwoWay::estimates(std::int64_t window) const { return !masses_.empty() && (window < 10 || window % 20 == 0); }
+// Contacts come and go slowly beside windows, but windows that find their length by themselves must see the first.
+bool TwoWay::estimates(std::int64_t window) const {
+  if (stability_.silent() || case_.scheme == SchemeKind::serial_implicit) return false;
+  return case_.in_steps.automatic || window < 10 || window % 20 == 0;
+}
 
-void TwoWay::check_stability(const std::map<std::string, protocol::Advance>& answers) {
-  for (const auto& [to, mass] : masses_) {
-    Vectors hold(mass.size(), Vec3::Zero()), part(mass.size());  // k Δt² + 2 c Δt [kg]
-    for (const auto& link : account_.links()) {
-      if (!link.mapping || link.about->to.text() != to) continue;
-      const auto answer = answers.find(link.about->from.participant);
-      if (answer == answers.end()) continue;
-      for (const auto& field : answer->second.fields) {
-        if (field.surface != link.about->from.surface || (field.name != "stiffness" && field.name != "dashpot")) continue;
-        link.mapping->shares(field.values, part);
-        const double factor = field.name == "stiffness" ? case_.window * case_.window : 2 * case_.window;
-        for (std::size_t k = 0; k < part.size(); ++k) hold[k] += factor * part[k];
-      }
-    }
-    double worst = 0;
-    std::size_t where = 0;
-    for (std::size_t k = 0; k < mass.size(); ++k)
-      for (int d = 0; d < case_.dimension; ++d)
-        if (mass[k][d] > 0 && hold[k][d] > worst * mass[k][d]) {
-          worst = hold[k][d] / mass[k][d];
-          where = k;
-        }
-    const double ratio = std::sqrt(worst);
-    if (ratio <= 0.5) continue;
-    const auto found = std::find_if(account_.links().begin(), account_.links().end(), [&, &surface = to](const Link& link) { return link.mapping && link.about->to.text() == surface; });
-    const Vec3& at = found->to->points[where];
-    const auto text = fmt::format("at {:.6g} s the contacts on {} at ({:.4g}, {:.4g}, {:.4g}) m and the {:.3g} kg there turn by {:.2f} radians a window",
-                                  case_.time(window_), to, at[0], at[1], at[2], mass[where].maxCoeff(), ratio);
-    if (ratio > 1 && !case_.allows_unstable)
-      throw Failure("coupler", "coupling",
-                    fmt::format("{}: an explicit scheme is unstable from 2 on, and refused from 1 on. Shorten the window, take softer contacts, a "
-                                "heavier surface or scheme = \"implicit\"; or say allow_unstable_scheme = true.", text),
-                    Failure::Cause::limit);
-    if (!warned_) reporter_.note(fmt::format("{}; from 0.5 on the explicit scheme loses accuracy, beyond 1 it is refused.", text));
-    warned_ = true;
+void TwoWay::check_stability() {
+  const auto worst = stability_.worst(span_.length());
+  // Each free particle of this kind would treble its motion in a hundred windows; a bed holds its particles, so this is said, not refused.
+  if (worst.growth > 0.01 && !grows_) {
+    reporter_.note(fmt::format("at {:.6g} s the lightest contacts would grow by {:.2g} of their motion in each window, were their particles free and "
+                               "undamped otherwise: the coupling may make energy. Shorten the window, or take scheme = \"implicit\".", case_.time(window_), worst.growth));
+    grows_ = true;
   }
+  if (worst.ratio <= 0.5) return;
+  const auto found = std::find_if(account_.links().begin(), account_.links().end(), [&](const Link& link) { return link.mapping && link.about->to.text() == worst.surface; });
+  const Vec3& at = found->to->points[worst.node];
+  const auto text = fmt::format("at {:.6g} s the contacts on {} at ({:.4g}, {:.4g}, {:.4g}) m and the {:.3g} kg there turn by {:.2f} radians a window",
+                                case_.time(window_), worst.surface, at[0], at[1], at[2], stability_.mass_at(worst), worst.ratio);
+  if (worst.ratio > 1 && !case_.allows_unstable)
+    throw Failure("coupler", "coupling",
+                  fmt::format("{}: an explicit scheme is unstable from 2 on, and refused from 1 on. {}, take softer contacts, a "
+                              "heavier surface or scheme = \"implicit\"; or say allow_unstable_scheme = true.", text,
+                              case_.in_steps.automatic ? "A window is a step of the particles already: shorten that" : "Shorten the window"),
+                  Failure::Cause::limit);
+  if (!warned_) reporter_.note(fmt::format("{}; from 0.5 on the explicit scheme loses accuracy, beyond 1 it is refused.", text));
+  warned_ = true;
 }
 
 // A consistent motion is not the transpose of the forces: the work is that on the points which sent them.

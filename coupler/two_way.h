@@ -13,6 +13,8 @@
 #include "coupler/case.h"
 #include "coupler/crew.h"
 #include "coupler/scheme.h"
+#include "coupler/stability.h"
+#include "coupler/window_span.h"
 
 namespace acopla::coupler {
 
@@ -53,7 +55,9 @@ class TwoWay final : public Scheme {
 
   void begin_loaders(std::int64_t window, const Motions* end);
   bool estimates(std::int64_t window) const;
-  void check_stability(const std::map<std::string, protocol::Advance>& answers);
+  void check_stability();
+  void begin_next(std::int64_t window);
+  void load(WindowRecord& window, Forces& forces, Motions& end);
   void begin_structures(Forces forces);
   void gather(std::size_t answers, WindowRecord& window, Forces& forces, Motions& motions);
   void balance(WindowRecord& window) const;
@@ -79,8 +83,10 @@ class TwoWay final : public Scheme {
   std::unique_ptr<Acceleration> acceleration_;  // implicit only
   Jump jump_;
   std::int64_t window_ = 0;
-  std::map<std::string, Vectors> masses_;  // of the structures' surfaces that know them; explicit schemes only
-  bool warned_ = false;
+  Stability stability_;
+  WindowSpan span_;     // of the present window; one tick unless it is automatic
+  bool saved_ = false;  // the loaders remember the present window's start
+  bool warned_ = false, grows_ = false;
 };
 
 }  // namespace acopla::coupler

@@ -380,13 +380,13 @@ Engine::Hold Engine::hold_on(std::size_t wall) const {
   WallForces stiffness;
   stiffness.vertex.assign(walls_.sent_vertices(), Vec3::Zero());
   stiffness.couple.assign(walls_.sent_facets(), Vec3::Zero());
-  auto dashpot = stiffness;
-  for (const auto& partition : partitions_) partition.walls.add_stiffness(kernels_, walls_, particles_, stiffness, dashpot);
+  auto dashpot = stiffness, mass = stiffness;
+  for (const auto& partition : partitions_) partition.walls.add_stiffness(kernels_, walls_, particles_, stiffness, dashpot, mass);
   const auto of_wall = [&](const WallForces& all) {
     const auto begin = all.vertex.begin() + static_cast<std::ptrdiff_t>(walls_.sent_vertex(wall, walls_.first_vertex(wall)));
     return std::vector<Vec3>(begin, begin + (walls_.first_vertex(wall + 1) - walls_.first_vertex(wall)));
   };
-  return {of_wall(stiffness), of_wall(dashpot)};
+  return {of_wall(stiffness), of_wall(dashpot), of_wall(mass)};
 }
 
 StabilityEstimate Engine::stability(double step) const {

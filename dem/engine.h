@@ -55,7 +55,7 @@ class Engine {
   StabilityEstimate stability(double step) const;
   /// How the contacts hold each vertex of a wall that is sent, the same in all three components.
   struct Hold {
-    std::vector<Vec3> stiffness, dashpot;  ///< [N/m], [N s/m]
+    std::vector<Vec3> stiffness, dashpot, mass;  ///< of the contacts [N/m], [N s/m], and of the particles that touch [kg]
   };
   Hold hold_on(std::size_t wall) const;
   /// Deepest overlap over the smaller radius.

@@ -155,6 +155,7 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
         auto hold = engine_->hold_on(wall);
         result.fields.push_back({scene_.walls[wall].name, "stiffness", std::move(hold.stiffness)});
         result.fields.push_back({scene_.walls[wall].name, "dashpot", std::move(hold.dashpot)});
+        result.fields.push_back({scene_.walls[wall].name, "mass", std::move(hold.mass)});
       }
   result.quantities = quantities(step);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

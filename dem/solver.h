@@ -26,7 +26,7 @@ class Solver final : public protocol::Participant {
   /// Reads and checks the table. @throws io::UserError
   Solver(const io::Table& root, const std::string& name);
 
-  protocol::Introduction introduce() const override { return {"dem", scene_.dimension, {"save", "checkpoint"}}; }
+  protocol::Introduction introduce() const override { return {"dem", scene_.dimension, {"save", "checkpoint"}, largest_step_}; }
   std::vector<protocol::Surface> start(const protocol::Run& run) override;
   protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override;
   std::vector<std::pair<std::string, double>> finish() override;

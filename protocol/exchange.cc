@@ -76,6 +76,7 @@ Message hello_message(const std::string& participant, const Introduction& introd
                   {"dimension", introduction.dimension},
                   {"versions", {version, version}},
                   {"capabilities", introduction.capabilities}};
+  if (introduction.step > 0) message.body["step"] = introduction.step;
   return message;
 }
 
@@ -85,6 +86,10 @@ Hello read_hello(const Message& message) {
   hello.introduction.solver = value<std::string>(message, message.body, "solver");
   hello.introduction.dimension = value<int>(message, message.body, "dimension");
   hello.introduction.capabilities = value<std::vector<std::string>>(message, message.body, "capabilities");
+  if (message.body.contains("step")) {
+    hello.introduction.step = value<double>(message, message.body, "step");
+    if (!(hello.introduction.step > 0) || !std::isfinite(hello.introduction.step)) throw ProtocolError("\"step\" of hello is not positive");
+  }
   const auto versions = value<Body>(message, message.body, "versions");
   if (!versions.is_array() || versions.size() != 2 || !fits<std::uint64_t>(versions[0]) || !fits<std::uint64_t>(versions[1]))
     throw ProtocolError("\"versions\" of hello must be [lowest, highest]");

@@ -15,6 +15,7 @@ struct Introduction {
   std::string solver;                     ///< e.g. "dem"
   int dimension = 3;                      ///< 2 or 3
   std::vector<std::string> capabilities;  ///< of "save", "checkpoint"; what is not listed is answered by an error
+  double step = 0;                        ///< the longest it takes by itself [s], for windows of so many steps; 0: it does not say
 };
 
 /// What the coupler tells a solver about the run.
@@ -53,7 +54,7 @@ struct Window {
   double start_time = 0;            ///< [s]
   double length = 0;                ///< [s]
   /// The coupler asks how stiffly the surfaces that are moved are held by what touches them: the fields `stiffness` [N/m] and `dashpot`
-  /// [N s/m] beside the others, in every component the sum over the contacts. Who does not know sends none.
+  /// [N s/m], and the `mass` [kg] of what touches, beside the others, in every component the sum over the contacts. Who does not know sends none.
   bool estimate = false;
   double end_time() const { return start_time + length; }
 };

@@ -567,7 +567,7 @@ void WallContactList::spread(const Group& group, std::size_t contact, std::uint3
 }
 
 void WallContactList::add_stiffness(const KernelTable& kernels, const WallSet& walls, const Particles& particles, WallForces& stiffness,
-                                    WallForces& dashpot) const {
+                                    WallForces& dashpot, WallForces& mass) const {
   for (const auto& group : groups_) {
     const auto& contacts = group.contacts;
     if (contacts.size == 0) continue;
@@ -582,6 +582,7 @@ void WallContactList::add_stiffness(const KernelTable& kernels, const WallSet& w
       const Vec3 point = particles.position[i].vector() - (r - overlap) * contacts.normal[c].vector();
       spread(group, c, element, walls, point, Vec3::Constant(-std::max(rates.normal, rates.shear)), Vec3::Zero(), stiffness);
       spread(group, c, element, walls, point, Vec3::Constant(-std::max(rates.normal_dashpot, rates.shear_dashpot)), Vec3::Zero(), dashpot);
+      spread(group, c, element, walls, point, Vec3::Constant(-particles.mass_of(i)), Vec3::Zero(), mass);
     }
   }
 }

@@ -52,8 +52,8 @@ class WallContactList {
   /// Of the last evaluation, one a wall.
   std::span<const WallResultant> resultants() const { return resultants_; }
   /// Adds the stiffness [N/m] and the dashpot [N s/m] of every present contact, the larger of normal and tangential, to the vertices of
-  /// walls that are sent, in all three components.
-  void add_stiffness(const KernelTable& kernels, const WallSet& walls, const Particles& particles, WallForces& stiffness, WallForces& dashpot) const;
+  /// walls that are sent, in all three components, and the mass of the particles that touch [kg].
+  void add_stiffness(const KernelTable& kernels, const WallSet& walls, const Particles& particles, WallForces& stiffness, WallForces& dashpot, WallForces& mass) const;
   std::size_t contact_count() const;
   std::size_t candidate_count() const;
   /// Calls action(particle, particle_material, wall_material, overlap, normal, curvature) for every present contact.

@@ -42,12 +42,13 @@ class Loader : public protocol::Participant {
  public:
   int steps = 32;              ///< of the classic Runge–Kutta method in a window: exact beside the coupling's error
   double stiffness = middle_spring, wall = wall_spring, own_mass = mass;
-  double dashpot = 0;          ///< beside the middle spring [N s/m]
+  double dashpot = 0, wall_dashpot = 0;  ///< beside the springs [N s/m]
   bool only_pushes = false;    ///< a contact: no force where the spring is longer than unstrained
   double gap = 0;              ///< [m], of the contact
   double u = 1, v = 0;         ///< [m], [m/s]
+  double step = 0;             ///< [s] as particles have it, instead of `steps`; 0: none
 
-  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save", "checkpoint"}}; }
+  protocol::Introduction introduce() const override { return {"oscillator", 3, {"save", "checkpoint"}, step}; }
   std::vector<protocol::Surface> start(const protocol::Run&) override {
     geometry::SurfaceMesh mesh;
     mesh.points.emplace_back(1.0 / 3, 1.0 / 3, 0);
@@ -66,8 +67,9 @@ class Loader : public protocol::Participant {
       const double stretch = own - other(s) - gap;
       return only_pushes && stretch < 0 ? 0 : stiffness * stretch + dashpot * (own_speed - v0);  // on mass 2
     };
-    const auto acceleration = [&](double own, double own_speed, double s) { return (-wall * own - force(own, own_speed, s)) / own_mass; };
+    const auto acceleration = [&](double own, double own_speed, double s) { return (-wall * own - wall_dashpot * own_speed - force(own, own_speed, s)) / own_mass; };
     double impulse = 0;
+    if (step > 0) steps = static_cast<int>(std::ceil(h / step * (1 - 1e-9)));
     const double dt = h / steps, ds = 1.0 / steps;
     for (int n = 0; n < steps; ++n) {
       const double s = n * ds, middle = s + ds / 2;
@@ -86,8 +88,10 @@ class Loader : public protocol::Participant {
     result.fields.push_back({"spring", "force", {Vec3(impulse / h, 0, 0)}});
     result.quantities = {{"u", u}, {"v", v}};
     if (window.estimate) {
-      result.fields.push_back({"spring", "stiffness", {Vec3::Constant(stiffness)}});
-      result.fields.push_back({"spring", "dashpot", {Vec3::Constant(dashpot)}});
+      const bool touches = !only_pushes || u - other(1) - gap >= 0;
+      result.fields.push_back({"spring", "stiffness", {Vec3::Constant(touches ? stiffness : 0)}});
+      result.fields.push_back({"spring", "dashpot", {Vec3::Constant(touches ? dashpot : 0)}});
+      result.fields.push_back({"spring", "mass", {Vec3::Constant(touches ? own_mass : 0)}});
     }
     return result;
   }

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "coupler/replay.h"
+#include "coupler/stability.h"
 #include "tests/integration/in_process.h"
 #include "tests/integration/oscillator.h"
 
@@ -218,6 +219,101 @@ TEST(TwoWay, WhereBothSidesSaySoTheLimitIsWatched) {
   EXPECT_EQ(judged(0.99), "");
   EXPECT_NE(judged(1.01).find("1.01 radians a window"), std::string::npos) << judged(1.01);
   EXPECT_EQ(judged(1.01, "\nallow_unstable_scheme = true"), "");
+}
+
+// What the coupler says of a particle and a node is what becomes of them in a run.
+TEST(TwoWay, AParticleOnANodeGrowsAsEstimated) {
+  const double window = 0.01;
+  struct Pair {
+    double turn, ratio, particle;
+    bool held;
+  };
+  for (const auto& [turn, ratio, particle, held] : {Pair{0.1, 0, 1e-3, false}, {0.5, 0, 0.1, false}, {1.5, 0, 1, false}, {0.5, 0.02, 1, false},
+                                                    {0.5, 0, 0.1, true}, {1, 0, 1e-3, true}, {0.5, 0.02, 0.1, true}, {2.9, 0.33, 1e-3, true}, {2.7, 0.33, 1e-3, true}}) {
+    Swing s;
+    s.first.own_mass = particle;
+    s.second.wall = 0;
+    s.first.steps = 256;
+    s.first.stiffness = std::pow(turn / window, 2);
+    s.first.dashpot = 2 * ratio * std::sqrt(s.first.stiffness * particle / (1 + particle));
+    s.first.wall = held ? s.first.stiffness : 0;
+    s.first.wall_dashpot = held ? s.first.dashpot : 0;
+    s.first.u = 0.01, s.second.u = held ? 0.01 : 0;
+    const coupler::Touch touch{s.first.stiffness, s.first.dashpot, particle, 1};
+    const double expected = std::log1p(held ? coupler::growth_of_held_particle(touch, window) : coupler::growth_of_free_particle(touch, window));
+    // So many windows that it trebles, or falls to a third, and no fewer than some swings.
+    const auto windows = static_cast<std::size_t>(std::clamp(2 / std::abs(expected), std::abs(expected) > 0.1 ? 30.0 : 300.0, 6000.0));
+    s.outcome = run(case_text(window, window * static_cast<double>(3 * windows), std::string(serial) + "\nallow_unstable_scheme = true"), s.first, s.second);
+    ASSERT_FALSE(s.outcome.error) << s.outcome.error->message;
+    // Of the free one their distance, since the pair goes its way.
+    const auto size = [&](std::size_t from) {
+      double square = 0;
+      for (auto k = from; k < from + windows; ++k) square += std::pow(held ? s.second.history[k] : s.first.history[k] - s.second.history[k], 2);
+      return std::sqrt(square);
+    };
+    const double grown = std::log(size(2 * windows) / size(windows)) / static_cast<double>(windows);
+    EXPECT_NEAR(grown, expected, 0.05 * std::abs(expected) + 2e-5) << turn << " " << ratio << " " << particle << " " << held;
+  }
+}
+
+TEST(TwoWay, WindowsCanBeSoManySteps) {
+  Swing s;
+  s.first.step = 0.001;
+  auto text = case_text(1, 0.1, serial);
+  text.replace(text.find("window = 1"), 10, "window = \"steps:3\"");
+  s.outcome = run(text, s.first, s.second);
+  ASSERT_FALSE(s.outcome.error) << s.outcome.error->message;
+  EXPECT_EQ(s.outcome.windows, 34);  // of 2.94 ms
+  EXPECT_EQ(s.first.steps, 3);
+  EXPECT_EQ(s.outcome.reached, 0.1);
+  // Nobody says how long its steps are.
+  Swing silent;
+  const auto outcome = run(text, silent.first, silent.second);
+  ASSERT_TRUE(outcome.error);
+  EXPECT_NE(outcome.error->message.find("no participant here says how long its steps are"), std::string::npos) << outcome.error->message;
+}
+
+std::string automatic(double end) {
+  auto text = case_text(1, end, serial);
+  text.replace(text.find("window = 1"), 10, "window = \"auto\"");
+  return text;
+}
+
+TEST(TwoWay, AutomaticWindowsAreTheLongestThatAreStable) {
+  const auto longest = [](double stiffness) {
+    Swing s;
+    s.first.step = 1e-4;
+    s.first.stiffness = stiffness;
+    s.second.knows_its_mass = true;
+    s.outcome = run(automatic(1), s.first, s.second);
+    EXPECT_FALSE(s.outcome.error) << s.outcome.error->message;
+    return s.first.steps;
+  };
+  // ω_c Δt ≤ 0.5 with M = 1 kg: 50, and 5 steps of 1e-4 s, so that 32, and 4, of at most that are the longest.
+  EXPECT_EQ(longest(1e4), 32);
+  EXPECT_EQ(longest(1e6), 4);
+}
+
+TEST(TwoWay, AutomaticWindowsTakeBackWhatAFirstContactShowsToBeTooLong) {
+  // A mass of 1 kg hits another at rest, which nothing holds: they exchange their speeds, in ten steps. The windows are long by then.
+  const auto hit = [](const std::string& text) {
+    Swing s;
+    s.first.only_pushes = true;
+    s.first.step = 1e-4;
+    s.first.u = -0.1, s.first.v = 1;
+    s.first.wall = s.second.wall = 0;
+    s.first.stiffness = 5e6;  // half a swing of both is 1 ms long
+    s.second.knows_its_mass = true;
+    s.outcome = run(text, s.first, s.second);
+    EXPECT_FALSE(s.outcome.error) << s.outcome.error->message;
+    return std::pair{s.second.v, s.outcome};
+  };
+  const auto [speed, outcome] = hit(automatic(0.2048));
+  EXPECT_NEAR(speed, 1, 0.02);
+  EXPECT_LT(outcome.windows, 400);                         // of 2048 steps
+  // As long as it liked to be, the same window makes as much energy as there was.
+  auto fixed = case_text(0.0064, 0.2048, std::string(serial) + "\nallow_unstable_scheme = true");
+  EXPECT_GT(hit(fixed).first, 1.5);
 }
 
 TEST(TwoWay, TheEnergyThatTheCouplingMadeIsBookedAndLimited) {

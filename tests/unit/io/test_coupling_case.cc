@@ -103,7 +103,7 @@ TEST(CouplingCase, OutOfRange) {
   expect_refused("window = 0.05", "window = nan", "is not a finite number");
   expect_refused("window = 0.05", "window = 1e-300", "more than this program can count");
   expect_refused("window = 0.05", "window = \"auto\"",
-                 "must be a number of seconds in this version");
+                 "finds the longest windows in which scheme = \"explicit\" is stable");
   expect_refused("dimension = 3", "dimension = 4", "dimension = 4 is outside [2, 3].");
   expect_refused("dimension = 3", "dimension = 2", "gravity must have 2 components, not 3.");
   expect_refused("max_distance = 0.02", "max_distance = -1",
@@ -115,8 +115,11 @@ TEST(CouplingCase, OutOfRange) {
 
 TEST(CouplingCase, WhatThisVersionDoesNotDoIsSaid) {
   expect_refused("one-way", "one-wey", "Did you mean \"one-way\"?");
-  expect_refused("to = \"structure.inside\"", "to = \"structure.inside\"\nmapping = \"overlap\"",
-                 "is not in this version yet. Use \"conservative\".");
+  expect_refused("to = \"structure.inside\"", "to = \"structure.inside\"\nmapping = \"overlp\"", "Did you mean \"overlap\"?");
+  expect_refused("to = \"structure.inside\"", "to = \"structure.inside\"\nmotion = \"consistent\"", "has a meaning where surfaces move");
+  expect_refused("to = \"structure.inside\"", "to = [\"structure.inside\"]", "lists a surface. Write several, which share the points of `from`, or one without brackets.");
+  expect_refused("window = 0.05", "window = \"steps:0\"", "= \"steps:0\" is no window. Write seconds, \"steps:N\"");
+  expect_refused("window = 0.05", "window = \"3 steps\"", "is no window");
   expect_refused(
       "[grains]",
       "[[coupling.interface]]\nfrom = \"structure.inside\"\nto = \"grains.box\"\n[grains]",
