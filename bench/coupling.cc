@@ -1,4 +1,4 @@
-// What two-way coupling costs and how well it does, as JSON lines: coupling orders | map [--coarse] | overhead VERTICES WINDOWS | mapping VERTICES
+// What two-way coupling costs and how well it does, as JSON lines: coupling orders | map [--coarse] | overhead VERTICES WINDOWS | mapping VERTICES [--overlap]
 #include <fmt/format.h>
 #include <malloc.h>
 
@@ -223,11 +223,11 @@ void overhead(std::size_t vertices, std::int64_t windows) {
   }
 }
 
-void mapping(std::size_t vertices) {
+void mapping(std::size_t vertices, coupler::MappingKind kind) {
   const auto n = static_cast<std::uint32_t>(std::lround(std::sqrt(static_cast<double>(vertices))) - 1);
   const auto from = square(n, 1e-3), to = square(n - 7, 0);
   auto begin = Clock::now();
-  const coupler::Mapping mapping(from, to, {0.1});
+  const coupler::Mapping mapping(from, to, {0.1, kind});
   const double build = seconds_since(begin);
   std::vector<Vec3> sent(from.points.size(), Vec3(1, 2, 3)), arrived(to.points.size());
   std::vector<double> times;
@@ -249,9 +249,9 @@ int main(int argc, char** argv) {
   if (mode == "orders") orders();
   else if (mode == "map") map(argc > 2 && std::string(argv[2]) == "--coarse");
   else if (mode == "overhead" && argc > 3) overhead(std::stoull(argv[2]), std::stoll(argv[3]));
-  else if (mode == "mapping" && argc > 2) mapping(std::stoull(argv[2]));
+  else if (mode == "mapping" && argc > 2) mapping(std::stoull(argv[2]), argc > 3 ? coupler::MappingKind::overlap : coupler::MappingKind::conservative);
   else {
-    fmt::print(stderr, "coupling orders | map [--coarse] | overhead VERTICES WINDOWS | mapping VERTICES\n");
+    fmt::print(stderr, "coupling orders | map [--coarse] | overhead VERTICES WINDOWS | mapping VERTICES [--overlap]\n");
     return 2;
   }
   return 0;

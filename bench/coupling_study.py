@@ -17,6 +17,8 @@ def run(study):
     orders(study, rows)
     cells = lines(study, "map", *(["--coarse"] if study.quick else []))
     map_of_schemes(study, cells)
+    mappings(study)
+    limits(study)
     if not study.quick:  # times, which the company of other tests would decide
         speed(study)
         large_run(study)
@@ -62,6 +64,40 @@ def map_of_schemes(study, cells):
                "Runge–Kutta in steps a hundred times finer. Plates whose own swing is faster than a window are integrated by their trapezoidal rule as they are.")
 
 
+def accuracy(study, part):
+    return [json.loads(line) for line in study.run([study.program("mapping_accuracy"), part]).splitlines()]
+
+
+def mappings(study):
+    fields, losses, rows = accuracy(study, "fields"), accuracy(study, "loads"), []
+    for loss in losses:
+        own = [row for row in fields if row["mapping"] == loss["mapping"]]
+        order = math.log2(own[-2]["error"] / own[-1]["error"])
+        if loss["mapping"] != "nearest":  # the last resort is of first order
+            study.at_least(f"Cubes of unlike meshes, {loss['mapping']}: order of Franke's function", "–", order, 1.9, "{:.2f}")
+        study.at_most(f"Cubes of unlike meshes, {loss['mapping']}: loss of Σ force", "–", loss["force"], 1e-12, "{:.1e}")
+        study.at_most(f"Cubes of unlike meshes, {loss['mapping']}: loss of Σ moment", "–", loss["moment"], 1e-12, "{:.1e}")
+        rows.append([loss["mapping"], *(f"{row['error']:.2e}" for row in own), f"{order:.2f}", f"{loss['force']:.1e}", f"{loss['moment']:.1e}"])
+    study.table("Unit cubes of triangles and of five eighths as many quads: Franke's function, random loads in five frames",
+                ["mapping", *(f"error, {row['cells']} cells a side" for row in own), "order", "loss of Σ force", "loss of Σ moment"], rows)
+
+
+def limits(study):
+    cells = accuracy(study, "limits")
+    ratios = sorted({c["ratio"] for c in cells})
+    at = {(c["particle"], c["ratio"]): c for c in cells}
+    study.target("Explicit scheme, particle of a ten-thousandth of the node in a damped bed: limit ω_c Δt", "–", at[1e-4, 0.33]["held"], "2.83 ± 0.02",
+                 abs(at[1e-4, 0.33]["held"] - math.sqrt(8)) <= 0.02, "{:.2f}")
+    study.target("Explicit scheme, particle of a thousand nodes, undamped: limit ω_c Δt", "–", at[1e3, 0.0]["free"], "2 ± 0.02",
+                 abs(at[1e3, 0.0]["free"] - 2) <= 0.02, "{:.2f}")
+    study.table("Explicit scheme: the turn ω_c Δt of a contact in a window up to which nothing grows by a thousandth a window; particle that nothing else holds / in a bed",
+                ["particle over node", *(f"ζ = {ratio:g}" for ratio in ratios)],
+                [[f"{particle:g}", *(f"{at[particle, r]['free']:.2f} / {at[particle, r]['held']:.2f}" for r in ratios)] for particle in sorted({c["particle"] for c in cells})])
+    study.text("ω_c² = k/M of the node's mass M, ζ of the contact with the reduced mass of both; 4.00: none found. From the eigenvalues of one window (docs/theory.md), which "
+               "the tests compare with coupled runs. Damping moves the limit both ways: it takes the growth of light particles away, and a dashpot against a heavy one "
+               "lowers the limit of 2 by (k Δt² + 2 c Δt)/M = 4.")
+
+
 def speed(study):
     rows = []
     for vertices, windows in ((100, 400), (1000, 400), (10000, 100)):
@@ -73,6 +109,9 @@ def speed(study):
     made = lines(study, "mapping", 100000)[0]
     study.at_most(f"Mapping of {made['vertices']} vertices built [s]", "–", made["build"], 1.0, "{:.3f}")
     study.at_most(f"Mapping of {made['vertices']} vertices applied [ms]", "–", 1e3 * made["apply"], 10.0, "{:.2f}")
+    overlap = lines(study, "mapping", 100000, "--overlap")[0]
+    study.at_most(f"Mapping of {overlap['vertices']} vertices by overlap built [s]", "–", overlap["build"], 1.0, "{:.3f}")
+    study.at_most(f"Mapping of {overlap['vertices']} vertices by overlap applied [ms]", "–", 1e3 * overlap["apply"], 10.0, "{:.2f}")
 
 
 # --- a run of real solvers ---------------------------------------------------------------------------------------------

@@ -44,8 +44,11 @@ void run_alone(Participant& participant, const io::Table& root, const std::strin
   const int dimension = participant.introduce().dimension;
   const double end = root.number("end", io::positive);
   double window = end;
-  if (const auto coupling = root.table_or_empty("coupling"); coupling.is_number("window")) window = coupling.number("window", io::positive);
-  const auto windows = std::max<std::int64_t>(1, std::llround(end / window));
+  const auto coupling = root.table_or_empty("coupling");
+  if (coupling.is_number("window")) window = coupling.number("window", io::positive);
+  else if (coupling.is_text("window") && coupling.text("window").starts_with("steps:") && participant.introduce().step > 0)
+    window = participant.introduce().step * std::max(1.0, std::atof(coupling.text("window").c_str() + 6));
+  const auto windows = std::max<std::int64_t>(1, std::llround(std::ceil(end / window * (1 - 1e-9))));
   Run run;
   run.tick = end / static_cast<double>(windows);
   run.end = windows;

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <tuple>
+#include <utility>
 
 namespace acopla::coupler {
 namespace {
@@ -114,6 +114,12 @@ const std::array<QuadraturePoint, 7> seven_points = [] {
                                          {{1 - 2 * a, a, a}, wa}, {{a, 1 - 2 * a, a}, wa}, {{a, a, 1 - 2 * a}, wa},
                                          {{1 - 2 * b, b, b}, wb}, {{b, 1 - 2 * b, b}, wb}, {{b, b, 1 - 2 * b}, wb}}};
 }();
+// Exact for degree 4 (Dunavant 1985): hat function times bilinear shape function, and one to spare.
+constexpr std::array<QuadraturePoint, 6> six_points = [] {
+  constexpr double a = 0.445948490915965, b = 0.091576213509771, wa = 0.223381589678011, wb = 0.109951743655322;
+  return std::array<QuadraturePoint, 6>{{{{1 - 2 * a, a, a}, wa}, {{a, 1 - 2 * a, a}, wa}, {{a, a, 1 - 2 * a}, wa},
+                                         {{1 - 2 * b, b, b}, wb}, {{b, 1 - 2 * b, b}, wb}, {{b, b, 1 - 2 * b}, wb}}};
+}();
 // Gauss's three points on [0, 1], exact for degree 5.
 const std::array<std::array<double, 2>, 3> line_points = [] {
   const double h = 0.5 * std::sqrt(0.6);
@@ -129,26 +135,34 @@ class Integration {
   Overlap rows() {
     for (std::size_t face = 0; face < from_.face_count(); ++face) {
       hats_.setZero(std::ssize(from_.nodes(face)), std::ssize(from_.nodes(face)));
+      from_kind_ = from_.kind(face);
       under_.clear();
       shares_.clear();
       for_each_piece(from_, face, [&](const Piece& piece) { add(piece); });
       enter(from_.nodes(face));
     }
-    // One face after another has added to a pair; the sum goes in that order, so that it does not depend on the sort.
-    std::stable_sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return std::tie(a.point, a.node) < std::tie(b.point, b.node); });
+    // By point, and of a point by node. One face after another has added to a pair; the sum goes in that order.
+    const auto points = from_.points.size();
+    std::vector<std::size_t> starts(points + 1, 0);
+    for (const auto& entry : entries_) ++starts[entry.point + 1];
+    for (std::size_t k = 1; k < starts.size(); ++k) starts[k] += starts[k - 1];
+    std::vector<std::pair<std::uint32_t, double>> sorted(entries_.size());
+    auto next = starts;
+    for (const auto& entry : entries_) sorted[next[entry.point]++] = {entry.node, entry.value};
     Overlap result;
-    result.starts.reserve(from_.points.size() + 1);
-    auto next = entries_.begin();
-    for (std::uint32_t point = 0; point < from_.points.size(); ++point) {
+    result.starts.reserve(points + 1);
+    for (std::uint32_t point = 0; point < points; ++point) {
+      const auto begin = sorted.begin() + static_cast<std::ptrdiff_t>(starts[point]), end = sorted.begin() + static_cast<std::ptrdiff_t>(starts[point + 1]);
+      std::stable_sort(begin, end, [](const auto& a, const auto& b) { return a.first < b.first; });
       double sum = 0;
-      for (; next != entries_.end() && next->point == point; ++next) {
-        sum += next->value;
-        if (result.nodes.size() > result.starts.back() && result.nodes.back() == next->node) {
-          result.weights.back() += next->value;
+      for (auto entry = begin; entry != end; ++entry) {
+        sum += entry->second;
+        if (result.nodes.size() > result.starts.back() && result.nodes.back() == entry->first) {
+          result.weights.back() += entry->second;
           continue;
         }
-        result.nodes.push_back(next->node);
-        result.weights.push_back(next->value);
+        result.nodes.push_back(entry->first);
+        result.weights.push_back(entry->second);
       }
       if (!(sum > least_cover * whole_[point])) {  // a hair's breadth says nothing about where a force goes
         result.nodes.resize(result.starts.back());
@@ -231,6 +245,7 @@ class Integration {
     if (geometry::corners_of(kind) < 3) return;
     const std::array<Vec2, 3> corners{frame(piece.corners[0].at), frame(piece.corners[1].at), frame(piece.corners[2].at)};
     const double whole = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    if (is_affine(kind)) return cover_affinely(piece, frame, normal, corners, whole, face, farthest);
     for_each_piece(to_, face, [&](const Piece& under) {
       const Vec3 area = (under.corners[1].at - under.corners[0].at).cross(under.corners[2].at - under.corners[0].at);
       if (!(std::abs(area.dot(normal)) >= least_cosine * area.norm()) || area.norm() == 0) return;
@@ -261,11 +276,64 @@ class Integration {
         const auto add_all = [&](const auto& rule) {
           for (const auto& [place, weight] : rule) take(place[0] * a + place[1] * b + place[2] * c, weight * half);
         };
-        if (kind == FaceKind::triangle3) add_all(three_points);
-        else add_all(seven_points);
+        add_all(seven_points);
       }
       enter(piece);
     });
+  }
+
+  /// A triangle, or a parallelogram, whose middles are in the middle: its parameters are linear in the place.
+  bool is_affine(FaceKind kind) const {
+    const auto corners = geometry::corners_of(kind);
+    if (kind == FaceKind::triangle3) return true;
+    const Vec3 u = points_[1] - points_[0], v = points_[corners - 1] - points_[0];
+    const double slack = 1e-12 * (u.norm() + v.norm());
+    if (corners == 4 && (points_[2] - points_[0] - u - v).norm() > slack) return false;
+    for (std::size_t k = corners; k < points_.size(); ++k) {
+      const auto& at = node_parameters(kind)[k];
+      const double s = corners == 4 ? 0.5 * (1 + at[0]) : at[0], t = corners == 4 ? 0.5 * (1 + at[1]) : at[1];
+      if ((points_[k] - points_[0] - s * u - t * v).norm() > slack) return false;
+    }
+    return true;
+  }
+
+  /// The same for such a face in one polygon, which the quadrature integrates exactly.
+  void cover_affinely(const Piece& piece, const Frame& frame, const Vec3& normal, const std::array<Vec2, 3>& corners, double whole, std::uint32_t face, double farthest) {
+    const auto kind = to_.kind(face);
+    const auto count = geometry::corners_of(kind);
+    const Vec3 u = points_[1] - points_[0], v = points_[count - 1] - points_[0], area = u.cross(v);
+    if (!(std::abs(area.dot(normal)) >= least_cosine * area.norm()) || area.norm() == 0) return;
+    const Vec2 origin = frame(points_[0]), along = frame(points_[1]) - origin, across = frame(points_[count - 1]) - origin;
+    const double turn = cross(along, across);
+    polygon_.clear();
+    for (std::size_t k = 0; k < count; ++k) polygon_.push_back(frame(points_[k]));
+    if (turn < 0) std::reverse(polygon_.begin(), polygon_.end());
+    for (std::size_t k = 0; k < 3 && polygon_.size() > 2; ++k) clip(polygon_, storage_, corners[k], corners[(k + 1) % 3]);
+    if (polygon_.size() < 3) return;
+    const auto middle = centroid(polygon_, no_more_than_an_edge * whole);
+    if (!middle) return;
+    const auto place = [&](const Vec2& p) { return Vec2(cross(p - origin, across) / turn, cross(along, p - origin) / turn); };
+    const Vec2 share = place(*middle);
+    if ((points_[0] + share[0] * u + share[1] * v - frame.at(*middle)).norm() > farthest) return;
+    begin(face);
+    const auto take = [&](const Vec2& p, double weight) {
+      const double first = cross(corners[1] - p, corners[2] - p) / whole, second = cross(corners[2] - p, corners[0] - p) / whole;
+      const Vec2 at = place(p);
+      gather({first, second, 1 - first - second}, 3, shape_functions(kind, count == 4 ? Vec2(2 * at[0] - 1, 2 * at[1] - 1) : at), weight);
+    };
+    for (std::size_t k = 1; k + 1 < polygon_.size(); ++k) {
+      const Vec2 &a = polygon_[0], &b = polygon_[k], &c = polygon_[k + 1];
+      const double half = 0.5 * cross(b - a, c - a);
+      const auto add_all = [&](const auto& rule) {
+        for (const auto& [at, weight] : rule) take(at[0] * a + at[1] * b + at[2] * c, weight * half);
+      };
+      switch (kind) {
+        case FaceKind::triangle3: add_all(three_points); break;
+        case FaceKind::quad9: add_all(seven_points); break;
+        default: add_all(six_points);
+      }
+    }
+    enter(piece);
   }
 
   static Vec2 parameters(FaceKind kind, const Piece::Corner& corner) {
@@ -279,7 +347,7 @@ class Integration {
   FaceValues located(FaceKind kind, const Frame& frame, const Vec2& p, Vec2 at) const {
     auto basis = shape_basis(kind, at);
     const bool line = geometry::corners_of(kind) == 2;
-    if (kind == FaceKind::triangle3 || kind == FaceKind::line2) return basis.value;
+    if (kind == FaceKind::line2) return basis.value;
     constexpr int enough = 10;  // steps; four do nearly always, as the pieces are near
     for (int step = 0; step < enough; ++step) {
       Vec3 x = Vec3::Zero(), by_u = x, by_v = x;
@@ -348,7 +416,9 @@ class Integration {
     for (const auto& shares : shares_)
       for (const double share : shares) covered += share;
     const bool dual = std::abs(covered - wholes.sum()) <= almost_all * wholes.sum();
-    if (dual) duals_ = wholes.asDiagonal() * hats_.inverse();
+    // Of triangles and of lines all are alike, 4 δ − 1 and 3 δ − 1.
+    if (dual && from_kind_ == FaceKind::triangle3) duals_ = 4 * Eigen::Matrix3d::Identity() - Eigen::Matrix3d::Ones();
+    else if (dual) duals_ = wholes.asDiagonal() * hats_.inverse();
     for (std::size_t k = 0; k < under_.size(); ++k) {
       const Eigen::VectorXd shares = Eigen::Map<const Eigen::VectorXd>(shares_[k].data(), size);
       const Eigen::VectorXd values = dual ? Eigen::VectorXd(duals_ * shares) : shares;
@@ -364,6 +434,7 @@ class Integration {
   std::vector<std::uint32_t> near_;
   std::vector<Vec3> points_;  // of the face of `to` under work
   Polygon polygon_, storage_;
+  FaceKind from_kind_ = FaceKind::line2;
   std::uint32_t face_ = 0;
   std::array<FaceValues, 3> sums_;  // of a piece and a face of `to`, by corner and node
   Eigen::MatrixXd hats_, duals_;    // of a face of `from`

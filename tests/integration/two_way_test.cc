@@ -256,6 +256,67 @@ TEST(TwoWay, AParticleOnANodeGrowsAsEstimated) {
   }
 }
 
+// Two springs side by side on one surface.
+class TwoLoaders final : public protocol::Participant {
+ public:
+  oscillator::Loader left, right;
+  protocol::Introduction introduce() const override { return left.introduce(); }
+  std::vector<protocol::Surface> start(const protocol::Run& run) override {
+    auto surfaces = left.start(run);
+    surfaces[0].mesh.points.push_back(surfaces[0].mesh.points[0] + geometry::Vec3(10, 0, 0));
+    return surfaces;
+  }
+  protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override {
+    const auto part = [&](std::size_t point) {
+      auto fields = received;
+      for (auto& field : fields) field.values = {field.values[point]};
+      return fields;
+    };
+    auto both = left.advance(window, part(0));
+    both.fields[0].values.push_back(right.advance(window, part(1)).fields[0].values[0]);
+    return both;
+  }
+  void save() override { left.save(), right.save(); }
+  void restore() override { left.restore(), right.restore(); }
+};
+
+class FarStructure final : public oscillator::Structure {
+ public:
+  std::vector<protocol::Surface> start(const protocol::Run& run) override {
+    auto surfaces = oscillator::Structure::start(run);
+    for (auto& point : surfaces[0].mesh.points) point.x() += 10;
+    return surfaces;
+  }
+};
+
+TEST(TwoWay, OneSurfaceMovesWithSeveralStructuresEachPointWithItsOwn) {
+  for (const auto* const scheme : {serial, implicit}) {
+    TwoLoaders loaders;
+    loaders.right.u = 0.5;
+    oscillator::Structure second;
+    FarStructure third;
+    third.v = 1;
+    auto text = case_text(1.0 / 64, 1, scheme);
+    text.replace(text.find("to = \"second.mass\""), 18, "to = [\"second.mass\", \"third.mass\"]");
+    text += "[third]\ncommand = [\"c\"]\n";
+    in_process::Door door;
+    const auto outcome = in_process::run(text, {{"first", &loaders}, {"second", &second}, {"third", &third}}, fmt::format("inproc://shared-{}", scheme == serial), door);
+    ASSERT_FALSE(outcome.error) << outcome.error->message;
+    EXPECT_LE(outcome.ledgers.force_loss, 1e-15);
+    EXPECT_EQ(outcome.interfaces.size(), 2u);
+    // Alone, each goes as it went here: to the tolerance, as together they iterate until both agree.
+    const double close = scheme == serial ? 1e-15 : 1e-9;
+    Swing near, far;
+    far.first.u = 0.5, far.second.v = 1;
+    for (auto* each : {&near, &far}) each->outcome = run(case_text(1.0 / 64, 1, scheme), each->first, each->second);
+    for (std::size_t k = 0; k < 64; ++k) {
+      ASSERT_NEAR(second.history[k], near.second.history[k], close);
+      ASSERT_NEAR(third.history[k], far.second.history[k], close);
+      ASSERT_NEAR(loaders.right.history[k], far.first.history[k], close);
+    }
+  }
+}
+
 TEST(TwoWay, WindowsCanBeSoManySteps) {
   Swing s;
   s.first.step = 0.001;
