@@ -61,7 +61,7 @@ void fields() {
   for (const auto kind : kinds)
     for (const std::uint32_t n : {16u, 32u, 64u}) {
       const auto from = cube(n, true), to = cube(n * 5 / 8, false);
-      const coupler::Mapping mapping(from, to, {0.01, kind});
+      const coupler::Mapping mapping(from, to, {0.1, kind});
       std::vector<Vec3> given(to.points.size()), carried(from.points.size());
       for (std::size_t k = 0; k < given.size(); ++k) given[k] = Vec3::Constant(franke(to.points[k]));
       mapping.conjugate_values(given, carried);
