@@ -264,7 +264,7 @@ Deck write_deck(const Scene& scene, const dem::Particles& particles, const dem::
     deck.meshes.push_back({wall.name, wall.mesh.points, wall.mesh.triangles});
   }
   deck.commands += writer.walls() + writer.gravity() +
-                   "fix motion all nve/sphere\nthermo 0\nthermo_style custom step atoms\nthermo_modify lost error norm no\n";
+                   "fix motion all nve/sphere\nthermo 0\nthermo_style custom step atoms\nthermo_modify lost ignore norm no\n";
   io::write_whole(base + ".in", deck.commands);
   return deck;
 }

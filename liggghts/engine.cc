@@ -113,6 +113,13 @@ void Engine::begin(Deck& deck) {
         else engine.sums_->add_step();
       },
       this);
+  make_forces();  // a mesh that LIGGGHTS does not take is refused here, before time begins
+}
+
+void Engine::make_forces() {
+  at_start_ = true;
+  run("run 0 post no");
+  at_start_ = false;
 }
 
 Progress Engine::take_steps(std::uint64_t steps, double step) {
@@ -122,9 +129,7 @@ Progress Engine::take_steps(std::uint64_t steps, double step) {
   step = numbers[1];
   if (step != step_) {
     run(fmt::format("timestep {:.17g}", step));
-    at_start_ = true;
-    run("run 0 post no");  // makes the forces of this instant, and reads the step
-    at_start_ = false;
+    make_forces();  // which is also when LIGGGHTS reads the step
     step_ = step;
   }
   sums_->begin(steps);
@@ -141,11 +146,12 @@ Progress Engine::take_steps(std::uint64_t steps, double step) {
     progress.kinetic_energy += 0.5 * mass[i] * (velocity.squaredNorm() + 0.4 * radius[i] * radius[i] * turn.squaredNorm());
     progress.mass += mass[i];
   }
-  progress.load.insert(progress.load.end(), {progress.kinetic_energy, progress.mass});
+  std::vector<double> others{progress.kinetic_energy, progress.mass, static_cast<double>(local_count(liggghts_))};
+  team_.sum(others);
   team_.sum(progress.load);
-  progress.mass = progress.load.back();
-  progress.kinetic_energy = progress.load[progress.load.size() - 2];
-  progress.load.resize(progress.load.size() - 2);
+  progress.kinetic_energy = others[0];
+  progress.mass = others[1];
+  progress.particles = static_cast<std::uint64_t>(others[2]);
   return progress;
 }
 

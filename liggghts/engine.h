@@ -18,6 +18,7 @@ struct Progress {
   std::vector<double> load;  ///< WallSums::mean() of all processes
   double kinetic_energy = 0;  ///< at the window's end [J]
   double mass = 0;            ///< [kg]
+  std::uint64_t particles = 0;
 };
 
 /// A particle in a picture.
@@ -44,6 +45,7 @@ class Engine {
   void begin(Deck& deck);
   Progress take_steps(std::uint64_t steps, double step);
   std::vector<Seen> collect();
+  void make_forces();
   void run(const std::string& command);
 
   Team& team_;

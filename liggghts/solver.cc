@@ -95,6 +95,9 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
   last_step_ = window.length / static_cast<double>(steps);
   const auto progress = engine_->advance(steps, last_step_);
   steps_ += steps;
+  if (progress.particles != deck_.particles)
+    throw std::runtime_error(fmt::format("{} of {} particles left the domain before t = {:.6g} s. Close the walls, shorten the step, or give {}.domain more room.",
+                                         deck_.particles - progress.particles, deck_.particles, window.end_time(), scene_.name));
 
   protocol::Advance result;
   result.steps = steps;
