@@ -250,7 +250,7 @@ Deck write_deck(const Scene& scene, const dem::Particles& particles, const dem::
   deck.commands = fmt::format(
       "# {} as LIGGGHTS has it\n"
       "atom_style granular\natom_modify map array\nboundary f f f\nnewton off\ncommunicate single vel yes\nprocessors * * 1\nunits si\n"
-      "hard_particles yes\nsoft_particles yes\nread_data {}.data\nneighbor {:.17g} bin\nneigh_modify delay 0\n",
+      "hard_particles yes\nsoft_particles yes\nread_data \"{}.data\"\nneighbor {:.17g} bin\nneigh_modify delay 0\n",
       scene.name, base, 0.6 * smallest);
   deck.commands += writer.materials();
   for (const auto& wall : scene.walls) {
@@ -260,7 +260,7 @@ Deck write_deck(const Scene& scene, const dem::Particles& particles, const dem::
     }
     const auto file = fmt::format("{}_{}.stl", base, wall.name);
     write_mesh(wall.mesh, file);
-    deck.commands += fmt::format("fix mesh_{} all mesh/surface file {} type {}\n", wall.name, file, wall_type(scene, wall.material));
+    deck.commands += fmt::format("fix mesh_{} all mesh/surface file \"{}\" type {}\n", wall.name, file, wall_type(scene, wall.material));
     deck.meshes.push_back({wall.name, wall.mesh.points, wall.mesh.triangles});
   }
   deck.commands += writer.walls() + writer.gravity() +

@@ -95,21 +95,19 @@ class Liggghts(unittest.TestCase):
         """The laws are the same but for the springs of friction and the force that rolling resistance is a share of: head on both
         converge to one trajectory."""
         difference = []
-        for fraction in (0.2, 0.1, 0.05):
+        for fraction in (0.05, 0.025, 0.0125):
             step = "\nstep_fraction = "
             for name, solver in (("dem", "dem"), ("liggghts", "liggghts")):
-                self.run_it(BOUNCE, *NO_ROLLING, ('solver = "dem"', f'solver = "{solver}"{step}{fraction}'), results=f"{name}{fraction}")
+                self.run_it(BOUNCE, *NO_ROLLING, ("-9.81", "0"), ('solver = "dem"', f'solver = "{solver}"{step}{fraction}'), results=f"{name}{fraction}")
             one, other = (self.series(f"{name}{fraction}", "kinetic_energy") for name in ("dem", "liggghts"))
             difference.append(abs(one - other).max() / one.max())
-        self.assertLess(difference[0], 0.03)
-        self.assertLess(difference[2], 0.4 * difference[0])  # of first order at least, but for the phase of the step at the impact
-        # And it is the restitution that was asked for.
-        energy = self.series("liggghts0.05", "kinetic_energy")
-        speed = numpy.sqrt(2 * energy / (2500 * numpy.pi / 6 * 0.04**3))
-        height = 0.02
-        before, impact = numpy.sqrt(1 + 2 * 9.81 * height), int(numpy.argmax(speed < 0.5 * speed.max()))
-        after = speed[impact + 1] + 9.81 * (0.002 * (impact + 2) - (before - 1) / 9.81)
-        self.assertAlmostEqual(after / before, 0.3, delta=0.01)
+        # Both take dashpots at the velocity of half a step before, one of them extrapolates it: of first order, but for the phase of the
+        # step at the impact.
+        self.assertLess(difference[2], 0.01)
+        self.assertLess(difference[2], 0.4 * difference[0])
+        # And it is the restitution that was asked for: 0.3.
+        energy = self.series("liggghts0.0125", "kinetic_energy")
+        self.assertAlmostEqual((energy[-1] / energy[0]) ** 0.5, 0.3, delta=0.003)
 
     def test_the_linear_law_is_the_same_too(self):
         linear = [('normal = "hertz"', 'normal = { law = "linear", stiffness = 2e4 }'), ('tangential = "mindlin"', 'tangential = { law = "linear_slider", ratio = 3.5 }'),
