@@ -116,14 +116,15 @@ class Writer {
   std::string walls() const {
     std::string text;
     std::vector<std::string> meshes;
+    int planes = 0;
     for (const auto& wall : scene_.walls) {
       if (!wall.is_plane) {
-        meshes.push_back("mesh_" + wall.name);
+        meshes.push_back(fmt::format("mesh{}", meshes.size()));
         continue;
       }
       int axis = 0;
       wall.normal.cwiseAbs().maxCoeff(&axis);
-      text += fmt::format("fix plane_{} all wall/gran {} store_force yes primitive type {} {}plane {:.17g} {}\n", wall.name, model(),
+      text += fmt::format("fix plane{} all wall/gran {} store_force yes primitive type {} {}plane {:.17g} {}\n", planes++, model(),
                           wall_type(scene_, wall.material), "xyz"[axis], wall.point[axis], settings());
     }
     if (!meshes.empty())
@@ -260,7 +261,7 @@ Deck write_deck(const Scene& scene, const dem::Particles& particles, const dem::
     }
     const auto file = fmt::format("{}_{}.stl", base, wall.name);
     write_mesh(wall.mesh, file);
-    deck.commands += fmt::format("fix mesh_{} all mesh/surface file \"{}\" type {}\n", wall.name, file, wall_type(scene, wall.material));
+    deck.commands += fmt::format("fix mesh{} all mesh/surface file \"{}\" type {}\n", deck.meshes.size(), file, wall_type(scene, wall.material));
     deck.meshes.push_back({wall.name, wall.mesh.points, wall.mesh.triangles});
   }
   deck.commands += writer.walls() + writer.gravity() +

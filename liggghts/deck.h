@@ -14,12 +14,12 @@ namespace acopla::liggghts {
 struct Deck {
   std::string commands;  ///< one a line, the data and mesh files included that they name
   struct Mesh {
-    std::string name;                                     ///< of the wall, and of its fix
+    std::string name;                                     ///< of the wall; its fix is mesh0, mesh1, …: LIGGGHTS allows names fewer letters
     std::vector<dem::Vec3> points;                        ///< [m]
     std::vector<std::array<std::uint32_t, 3>> triangles;  ///< numbered as LIGGGHTS numbers them
   };
   std::vector<Mesh> meshes;
-  std::vector<std::string> planes;  ///< names of walls
+  std::vector<std::string> planes;  ///< names of walls; plane0, plane1, …
   std::uint64_t particles = 0;
 };
 

@@ -42,7 +42,8 @@ WallSums::WallSums(LAMMPS_NS::LAMMPS* liggghts, const Deck& deck) : liggghts_(li
   for (const auto& mesh : deck.meshes) {
     Vec3 mean = Vec3::Zero();
     for (const auto& point : mesh.points) mean += point / static_cast<double>(mesh.points.size());
-    places_.push_back({contact_fix(liggghts, "contactforces_mesh_" + mesh.name), contact_fix(liggghts, "contactforces_stress_mesh_" + mesh.name),
+    const auto number = places_.size();
+    places_.push_back({contact_fix(liggghts, fmt::format("contactforces_mesh{}", number)), contact_fix(liggghts, fmt::format("contactforces_stress_mesh{}", number)),
                        vertices, triangles, mean});
     vertices += mesh.points.size();
     triangles += mesh.triangles.size();
@@ -100,7 +101,7 @@ void WallSums::collect_mesh(std::size_t number, WallForces& forces) const {
 }
 
 void WallSums::collect_plane(std::size_t number, WallForces& forces) const {
-  const auto name = "force_plane_" + deck_.planes[number];
+  const auto name = fmt::format("force_plane{}", number);
   const auto* const* const on_particles = static_cast<double**>(lammps_extract_fix(liggghts_, name.c_str(), 1, 2, 0, 0));
   if (!on_particles) throw std::logic_error(fmt::format("LIGGGHTS keeps no {}", name));
   const auto count = *static_cast<int*>(lammps_extract_global(liggghts_, "nlocal"));

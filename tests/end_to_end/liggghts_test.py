@@ -109,6 +109,16 @@ class Liggghts(unittest.TestCase):
         energy = self.series("liggghts0.0125", "kinetic_energy")
         self.assertAlmostEqual((energy[-1] / energy[0]) ** 0.5, 0.3, delta=0.003)
 
+    def test_planes_carry_the_weight_as_meshes_do(self):
+        # Between two planes beside it and on one below, with a name that LIGGGHTS would not take.
+        mesh = '[grains.wall.floor]\nmesh = "floor.stl"\nmaterial = "glass"'
+        planes = "".join(f'[grains.wall.{name}]\nplane = {{ point = {point}, normal = {normal} }}\nmaterial = "glass"\n' for name, point, normal in
+                         (("left-side", "[0.09, 0, 0]", "[1, 0, 0]"), ("right-side", "[0.13, 0, 0]", "[-1, 0, 0]"), ("below", "[0, 0, -0.01]", "[0, 0, 1]")))
+        self.run_it(BOUNCE, TWO, (mesh, planes), ('[[coupling.interface]]\nfrom = "grains.floor"\n', ""), ("end = 0.2", "end = 0.6"), results="out")
+        weight = self.series("out", "weight")[-1]
+        self.assertAlmostEqual(self.series("out", "below.force.z")[-20:].mean(), -weight, delta=1e-3 * weight)
+        self.assertEqual(self.series("out", "particles")[-1], 1)
+
     def test_the_linear_law_is_the_same_too(self):
         linear = [('normal = "hertz"', 'normal = { law = "linear", stiffness = 2e4 }'), ('tangential = "mindlin"', 'tangential = { law = "linear_slider", ratio = 3.5 }'),
                   *NO_ROLLING, ("velocity = [0, 0, -1]", "velocity = [0.4, 0, -1], spin = [0, 0, 3]")]
