@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "dem/checkpoint.h"
+#include "dem/start_from.h"
 #include "dem/engine.h"
 #include "dem/feeding/insertion.h"
 #include "dem/neighbours.h"

@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "cli/mpi_command.h"
+
 namespace acopla::cli {
 namespace {
 
@@ -57,7 +59,10 @@ Command command_of(const coupler::ParticipantCase& participant, const std::strin
                          {"ACOPLA_CASE", full.string()}};
   if (!participant.solver.empty()) {
     command.words = {solver_path(participant), case_file, "--as", participant.name};
+    // A participant that is asked about its table, not run, is one process.
+    const int processes = case_file.empty() ? 1 : processes_of(case_file, participant.name);
     if (!endpoint.empty()) command.words.insert(command.words.end(), {"--connect", endpoint});
+    if (!endpoint.empty()) run_on_processes(command, processes, case_file, participant.name);
     return command;
   }
   command.environment.emplace_back("PYTHONPATH", python_path());

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "dem/domain.h"
 #include "dem/laws.h"
 #include "dem/simd.h"
 
@@ -43,7 +44,7 @@ Engine::Engine(const Scene& scene, Particles particles, WallSet walls)
       partitions_(std::max(1u, scene.partitions)), team_(std::max(1u, scene.threads)) {
   for (const auto& material : scene.materials) densities_.push_back(material.density);
   set_sizes();
-  set_domain(scene);
+  domain_ = domain_of(scene, particles_, walls_);
   loads_ = WallLoadSum(walls_, partitions_.size());
 }
 
@@ -59,25 +60,6 @@ void Engine::set_sizes() {
     skin_ = 0.3 * smallest_;
     near_skin_ = 0.01 * smallest_;
   }
-}
-
-void Engine::set_domain(const Scene& scene) {
-  if (scene.domain) {
-    domain_ = *scene.domain;
-    return;
-  }
-  // Everything the case names, and half as much again around it.
-  Vec3 low = Vec3::Constant(1e300), high = -low;
-  const auto include = [&](const Vec3& a, const Vec3& b) {
-    low = low.cwiseMin(a);
-    high = high.cwiseMax(b);
-  };
-  for (const auto& box : scene.regions()) include(box.low, box.high);
-  for (const auto& p : particles_.position) include(p.vector(), p.vector());
-  if (const auto box = walls_.bounds()) include(box->low, box->high);
-  if (!(low[0] <= high[0])) include(Vec3::Zero(), Vec3::Zero());
-  const Vec3 margin = Vec3::Constant(0.5 * (high - low).maxCoeff() + 10 * largest_);
-  domain_ = {low - margin, high + margin};
 }
 
 void Engine::advance(std::uint64_t steps, double step) {

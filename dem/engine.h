@@ -133,7 +133,6 @@ class Engine {
   };
 
   void start();
-  void set_domain(const Scene& scene);
   void set_sizes();
   void move(double kick, double step);
   void complete(double kick);

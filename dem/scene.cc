@@ -11,9 +11,9 @@
 #include <set>
 
 #include "dem/contact/restitution.h"
-#include "dem/checkpoint.h"
 #include "dem/feeding/read.h"
 #include "dem/laws.h"
+#include "dem/start_from.h"
 #include "dem/wall/read.h"
 
 namespace acopla::dem {

@@ -10,6 +10,7 @@
 
 #include "dem/checkpoint.h"
 #include "dem/feeding/insertion.h"
+#include "dem/start_from.h"
 #include "dem/step.h"
 
 namespace acopla::dem {

@@ -8,47 +8,25 @@ import os
 import pathlib
 import subprocess
 import sys
-import tempfile
 import unittest
 
 BIN, SOURCE, PLATE = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve(), os.path.abspath(sys.argv[3])
-CASE = """title = "plate"
-dimension = 3
-end = 1.0
-[coupling]
-scheme = "one-way"
-window = 0.05
-max_distance = 0.02
-[[coupling.interface]]
-from = "grains.box"
-to = "plate.top"
-[grains]
-command = ["{bin}/stub_participant", "send"]
-[plate]
-command = {command}
-mass = 2.0
-spring = 800.0
-dashpot = 8.0
-[expect]
-"plate.u" = {{ value = 0, absolute = 1e9 }}
-"plate.v" = {{ value = 0, absolute = 1e9 }}
-"""
-
-
-def run(command):
-    with tempfile.TemporaryDirectory() as folder:
-        pathlib.Path(folder, "case.toml").write_text(CASE.format(bin=BIN, command=json.dumps(command)))
-        done = subprocess.run([f"{BIN}/acopla", "run", "case.toml", "--results", "results"], cwd=folder, capture_output=True, text=True, timeout=60)
-        summary = json.loads(pathlib.Path(folder, "results/summary.json").read_text())
-    return done, [expectation["value"] for expectation in summary["expectations"]]
+sys.path.insert(0, str(SOURCE / "tests/end_to_end"))
+from case_runner import CaseFolder  # noqa: E402
+from sample_cases import PLATE as CASE  # noqa: E402
 
 
 class PlateInC(unittest.TestCase):
+    def run_plate(self, *command):
+        case = CaseFolder(self, BIN)
+        done = case.run("run", case.write(CASE.format(programs=BIN, send="", command=json.dumps(command))), "--results", "out")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return case.quantities()
+
     def test_it_moves_as_the_plate_in_python(self):
-        here, c = run([PLATE, "2.0", "800.0", "8.0"])
-        there, python = run(["/usr/bin/python3", str(SOURCE / "docs/examples/python/plate.py")])
-        self.assertEqual((here.returncode, there.returncode), (0, 0), here.stderr + there.stderr)
-        for mine, theirs in zip(c, python):
+        c, python = self.run_plate(PLATE, "2.0", "800.0", "8.0"), self.run_plate("/usr/bin/python3", str(SOURCE / "docs/examples/python/plate.py"))
+        for name, theirs in python.items():
+            mine = c[name]
             self.assertNotEqual(mine, 0)
             # The same formula through two libraries' complex sines: some ulps a window, 20 windows.
             self.assertAlmostEqual(mine, theirs, delta=1e-13 * abs(theirs))

@@ -7,13 +7,15 @@ import concurrent.futures
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
 BIN, SOURCE = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve()
+sys.path.insert(0, str(SOURCE / "tests/end_to_end"))
+from case_runner import CaseFolder  # noqa: E402
+from sample_cases import GLASS, floor  # noqa: E402
+
 BROKEN, EXAMPLES = SOURCE / "tests/conformance/broken.py", SOURCE / "docs/examples/python"
 
 # fault: (rule, sentence). The sentence is the whole of what the kit says.
@@ -69,7 +71,7 @@ FAULTS = {
     "silence": ("silence", "did not end within 15 s after the last ping"),
 }
 
-DEM = """title = "spheres"
+DEM = f"""title = "spheres"
 dimension = 3
 gravity = [0, 0, -9.81]
 end = 1.0
@@ -82,29 +84,17 @@ from = "grains.floor"
 to = "structure.top"
 [grains]
 solver = "dem"
-[grains.material.glass]
-density = 2500
-shear_modulus = 5e6
-poisson = 0.25
-[[grains.contact]]
-between = [["glass", "glass"]]
-normal = "hertz"
-tangential = "mindlin"
-rolling = "constant_torque"
-restitution = 0.3
-friction = 0.5
-rolling_friction = 0.05
-[grains.wall.floor]
+{GLASS}[grains.wall.floor]
 mesh = "floor.stl"
 material = "glass"
 [[grains.insert]]
 material = "glass"
 diameter = 0.04
 count = 20
-region = { box = [[0, 0, 0], [0.3, 0.3, 0.3]] }
+region = {{ box = [[0, 0, 0], [0.3, 0.3, 0.3]] }}
 [structure]
 solver = "fem"
-mesh = { plate = { size = [0.3, 0.3, 0.02], cells = [3, 3, 1] } }
+mesh = {{ plate = {{ size = [0.3, 0.3, 0.02], cells = [3, 3, 1] }} }}
 analysis = "dynamic"
 [structure.material]
 young = 1e7
@@ -112,9 +102,6 @@ poisson = 0.3
 density = 1000
 [structure.fix.edges]
 """
-STL = "solid floor\n" + "".join(
-    "facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {x} {y} 0\n" for x, y in triangle) + "endloop\nendfacet\n"
-    for triangle in (((0, 0), (0.3, 0), (0.3, 0.3)), ((0, 0), (0.3, 0.3), (0, 0.3)))) + "endsolid floor\n"
 
 
 def examine(arguments, command=(), **options):
@@ -164,10 +151,8 @@ class Conformance(unittest.TestCase):
         self.assertEqual({line.split()[0] for line in listed}, {rule for rule, _ in FAULTS.values()})
 
     def test_the_examples_in_python_pass(self):
-        with tempfile.TemporaryDirectory() as folder:
-            for name in ("plate", "membrane", "oscillator_half"):
-                shutil.copy(EXAMPLES / f"{name}.py", folder)
-            case = """title = "examples"
+        folder = CaseFolder(self, BIN, EXAMPLES.glob("*.py"))
+        case = """title = "examples"
 dimension = 3
 end = 1.0
 [coupling]
@@ -196,22 +181,22 @@ command = ["/usr/bin/python3", "membrane.py"]
 tension = 100.0
 density = 0.5
 """
-            pathlib.Path(folder, "case.toml").write_text(case)
-            # The half that sends forces has one surface: a case of its own.
-            pathlib.Path(folder, "two.toml").write_text(re.sub(r'\[\[coupling.interface\]\]\nfrom = "left.end[23]"\nto = .*\n', "", case))
-            for file, name in (("two.toml", "left"), ("two.toml", "right"), ("case.toml", "plate"), ("case.toml", "membrane")):
-                with self.subTest(name):
-                    self.assert_kept(examine(["--case", f"{folder}/{file}", "--as", name, "--quick"]), but={"checkpoint", "busy-pings", "silence"})
+        folder.write(case)
+        # The half that sends forces has one surface: a case of its own.
+        folder.write(re.sub(r'\[\[coupling.interface\]\]\nfrom = "left.end[23]"\nto = .*\n', "", case), name="two.toml")
+        for file, name in (("two.toml", "left"), ("two.toml", "right"), ("case.toml", "plate"), ("case.toml", "membrane")):
+            with self.subTest(name):
+                self.assert_kept(examine(["--case", folder.path / file, "--as", name, "--quick"]), but={"checkpoint", "busy-pings", "silence"})
 
     def test_the_solvers_pass(self):
-        with tempfile.TemporaryDirectory() as folder:
-            pathlib.Path(folder, "case.toml").write_text(DEM)
-            pathlib.Path(folder, "floor.stl").write_text(STL)
-            for solver, name in (("dem", "grains"), ("fem", "structure")):
-                if not os.path.exists(f"{BIN}/acopla-{solver}"):
-                    continue  # a build without deal.II
-                with self.subTest(solver):
-                    self.assert_kept(examine(["--case", f"{folder}/case.toml", "--as", name]), but={"unsupported", "busy-pings"})
+        folder = CaseFolder(self, BIN)
+        folder.write(floor(0.3), name="floor.stl")
+        case = folder.write(DEM)
+        for solver, name in (("dem", "grains"), ("fem", "structure")):
+            if not os.path.exists(f"{BIN}/acopla-{solver}"):
+                continue  # a build without deal.II
+            with self.subTest(solver):
+                self.assert_kept(examine(["--case", case, "--as", name]), but={"unsupported", "busy-pings"})
 
     def test_mistakes_on_the_command_line_are_told(self):
         for arguments, command, sentence in (

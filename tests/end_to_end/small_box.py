@@ -1,6 +1,5 @@
 #!/usr/bin/python3
 """The real programs on a box with 50 spheres: small_box.py BIN. What a user gets, and what he is told when it goes wrong."""
-import json
 import os
 import pathlib
 import re
@@ -13,91 +12,32 @@ import time
 import unittest
 import unittest.mock
 
-BIN = pathlib.Path(sys.argv.pop(1)).resolve()
-ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-WEIGHT = 50 * 2500 * 3.141592653589793 / 6 * 0.04**3 * 9.81
+from case_runner import CaseFolder
+from sample_cases import SMALL_BOX, WEIGHT, make_small_box
 
-CASE = f"""title = "small box"
-dimension = 3
-gravity = [0, 0, -9.81]
-end = 1.0
-[coupling]
-scheme = "one-way"
-window = 0.05
-max_distance = 0.02
-[[coupling.interface]]
-from = "grains.box"
-to = "structure.inside"
-[grains]
-solver = "dem"
-[grains.material.glass]
-density = 2500
-shear_modulus = 5e6
-poisson = 0.25
-[[grains.contact]]
-between = [["glass", "glass"]]
-normal = "hertz"
-tangential = "mindlin"
-rolling = "constant_torque"
-restitution = 0.3
-friction = 0.5
-rolling_friction = 0.05
-[grains.wall.box]
-mesh = "box.stl"
-material = "glass"
-[[grains.insert]]
-material = "glass"
-diameter = 0.04
-count = 50
-region = {{ box = [[0, 0, 0], [0.3, 0.3, 0.3]] }}
-[structure]
-solver = "fem"
-mesh = "box.msh"
-degree = 1
-[structure.material]
-young = 2.1e11
-poisson = 0.3
-[structure.fix.base]
-[expect]
-"structure.reaction.z" = {{ value = {WEIGHT:.9g}, relative = 2e-3, mean_over = 0.2, source = "weight of the spheres" }}
-"""
+BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 
 
 class SmallBox(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.meshes = pathlib.Path(tempfile.mkdtemp(prefix="acopla-test-"))
-        subprocess.run(["/usr/bin/python3", ROOT / "cases/box_fill/make_meshes.py", "--side", "0.3", "--stl", cls.meshes / "box.stl",
-                        "--triangles", "9", "8", "--msh", cls.meshes / "box.msh", "--cells", "7", "8"], check=True, stdout=subprocess.DEVNULL)
+        make_small_box(cls.meshes)
 
     @classmethod
     def tearDownClass(cls):
         shutil.rmtree(cls.meshes)
 
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="acopla-test-"))
-        for name in ("box.stl", "box.msh"):
-            shutil.copy(self.meshes / name, self.folder)
+        self.case = CaseFolder(self, BIN, self.meshes.iterdir())
+        self.folder, self.summary = self.case.path, self.case.summary
 
-    def tearDown(self):
-        left = subprocess.run(["pgrep", "-f", str(self.folder)], capture_output=True, text=True).stdout.split()
-        shutil.rmtree(self.folder, ignore_errors=True)
-        self.assertEqual(left, [], "processes were left behind")
-
-    def write(self, *changes, text=CASE):
-        for old, new in changes:
-            self.assertIn(old, text)
-            text = text.replace(old, new, 1)
-        path = self.folder / "case.toml"
-        path.write_text(text)
-        return path
+    def write(self, *changes, text=SMALL_BOX):
+        return self.case.write(text, *changes)
 
     def acopla(self, *arguments, program="acopla"):
-        done = subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, timeout=120, cwd=self.folder)
+        done = self.case.run(*arguments, program=program)
         return done.returncode, done.stdout + done.stderr
-
-    def summary(self, name="out"):
-        return json.loads((self.folder / name / "summary.json").read_text())
 
     # --- what a user gets ---------------------------------------------------------------------------------------------
     def test_run_balances_the_weight_and_leaves_results(self):
@@ -133,11 +73,11 @@ class SmallBox(unittest.TestCase):
         case = self.write(('scheme = "one-way"\nwindow = 0.05', 'scheme = "explicit"\nwindow = 1e-4\ncheckpoint_every = 0.03\noutput_every = 0.05'), ("end = 1.0", "end = 0.15"),
                           ('mesh = "box.msh"', 'mesh = "box.msh"\nanalysis = "dynamic"\nrayleigh = { mass = 10 }\noutput = { every = 0.05 }'),
                           ("young = 2.1e11", "young = 1e8\ndensity = 8000"),
-                          text=CASE[:CASE.index("[expect]")])
+                          text=SMALL_BOX[:SMALL_BOX.index("[expect]")])
         with unittest.mock.patch.dict(os.environ, alone):
             code, text = self.acopla("run", case, "--results", "whole")
             self.assertEqual(code, 0, text)
-            process = subprocess.Popen([BIN / "acopla", "run", case, "--results", "killed"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.folder)
+            process = self.case.start("run", case, "--results", "killed", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             deadline = time.time() + 60
             while not (self.folder / "killed/checkpoint/coupler.h5").exists() and time.time() < deadline:
                 time.sleep(0.01)
@@ -158,7 +98,7 @@ class SmallBox(unittest.TestCase):
             self.assertEqual((self.folder / "whole" / series).read_text(), (self.folder / "killed" / series).read_text(), series)
 
     def test_first_line_comes_at_once(self):
-        process = subprocess.Popen([BIN / "acopla", "run", self.write(), "--results", "out"], stdout=subprocess.PIPE, text=True, cwd=self.folder)
+        process = self.case.start("run", self.write(), "--results", "out", stdout=subprocess.PIPE)
         begin = time.time()
         line = process.stdout.readline()
         waited = time.time() - begin
@@ -256,8 +196,7 @@ class SmallBox(unittest.TestCase):
 
     def start(self):
         case = self.write(("end = 1.0", "end = 100.0"))
-        process = subprocess.Popen([BIN / "acopla", "run", case, "--results", "out"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                                   cwd=self.folder)
+        process = self.case.start("run", case, "--results", "out", stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         deadline = time.time() + 20
         while time.time() < deadline:  # until some windows are through
             time.sleep(0.1)

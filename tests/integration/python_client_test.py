@@ -3,48 +3,24 @@
 
 Usage: python_client_test.py FOLDER_OF_EXECUTABLES SOURCE_FOLDER [test names]
 """
-import json
 import math
 import os
 import pathlib
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
 BIN, SOURCE = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve()
 EXAMPLES = SOURCE / "docs/examples/python"
-sys.path[:0] = [str(EXAMPLES), str(SOURCE / "protocol/python")]
+sys.path[:0] = [str(EXAMPLES), str(SOURCE / "protocol/python"), str(SOURCE / "tests/end_to_end")]
 import acopla  # noqa: E402
 import membrane  # noqa: E402
 import numpy  # noqa: E402
 import plate  # noqa: E402
-
-PLATE = """title = "plate"
-dimension = 3
-end = 1.0
-[coupling]
-scheme = "one-way"
-window = 0.05
-max_distance = 0.02
-[[coupling.interface]]
-from = "grains.box"
-to = "plate.top"
-[grains]
-command = ["{bin}/stub_participant", "send"{send}]
-[plate]
-command = ["/usr/bin/python3", "{script}"]
-mass = 2.0
-spring = 800.0
-dashpot = 8.0
-{plate}
-[expect]
-"plate.u" = {{ value = 0, absolute = 1e9 }}
-"plate.v" = {{ value = 0, absolute = 1e9 }}
-"""
+from case_runner import CaseFolder  # noqa: E402
+from sample_cases import PLATE  # noqa: E402
 
 OSCILLATOR = """title = "two halves"
 dimension = 3
@@ -68,29 +44,20 @@ command = ["/usr/bin/python3", "oscillator_half.py"]
 
 
 class Run:
-    """A run of `acopla run` in a folder of its own, which holds the examples and these scripts."""
+    """A run of `acopla run` in a folder that holds the examples and these scripts."""
 
     def __init__(self, test, case, scripts=()):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="python-client-"))
-        test.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-        for script in EXAMPLES.glob("*.py"):
-            shutil.copy(script, self.folder)
+        self.case = CaseFolder(test, BIN, EXAMPLES.glob("*.py"))
         for name, text in scripts:
-            (self.folder / name).write_text(text)
-        (self.folder / "case.toml").write_text(case)
+            (self.case.path / name).write_text(text)
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-        self.process = subprocess.Popen([f"{BIN}/acopla", "run", "case.toml", "--results", "results"], cwd=self.folder, env=environment,
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = self.case.start("run", self.case.write(case), "--results", "out", env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def end(self):
         self.out, self.err = self.process.communicate(timeout=60)
         self.code = self.process.returncode
-        self.log = "".join(path.read_text() for path in sorted(self.folder.glob("results/log/*")))
+        self.log = "".join(path.read_text() for path in sorted(self.case.path.glob("out/log/*")))
         return self
-
-    def quantities(self):
-        expectations = json.loads((self.folder / "results/summary.json").read_text())["expectations"]
-        return {expectation["name"]: expectation["value"] for expectation in expectations}
 
 
 def known_force(window, points):
@@ -114,7 +81,7 @@ def exact_plate(m, k, c, h, forces):
 
 class Plate(unittest.TestCase):
     def run_plate(self, script="plate.py", keys="", send="", scripts=()):
-        return Run(self, PLATE.format(bin=BIN, script=script, plate=keys, send=send), scripts)
+        return Run(self, PLATE.format(programs=BIN, command=f'["/usr/bin/python3", "{script}"]\n{keys}', send=send), scripts)
 
     def failing(self, line):
         text = f"import acopla, plate\nclass Bad(plate.Plate):\n{line}\nacopla.serve(Bad(2.0, 800.0))\n"
@@ -124,7 +91,7 @@ class Plate(unittest.TestCase):
         run = self.run_plate().end()
         self.assertEqual(run.code, 0, run.err)
         u, v, _ = exact_plate(2.0, 800.0, 8.0, 0.05, [known_force(k, 64) for k in range(20)])
-        found = run.quantities()
+        found = run.case.quantities()
         # Both are exact for forces constant in a window; the mapping keeps the sum of forces to round-off.
         self.assertAlmostEqual(found["plate.u"], u, delta=1e-12 * abs(u))
         self.assertAlmostEqual(found["plate.v"], v, delta=1e-11 * abs(v))
@@ -185,7 +152,7 @@ class Plate(unittest.TestCase):
             for entry in pathlib.Path("/proc").glob("[0-9]*"):
                 try:
                     words = (entry / "cmdline").read_bytes().split(b"\0")
-                    if script.encode() in words and os.readlink(entry / "cwd") == str(run.folder) and b"python3" in words[0]:
+                    if script.encode() in words and os.readlink(entry / "cwd") == str(run.case.path) and b"python3" in words[0]:
                         return int(entry.name)
                 except OSError:
                     pass
@@ -211,7 +178,7 @@ class Oscillator(unittest.TestCase):
     def error(self, window, scheme, loader="left", structure="right", end=0.6):
         run = Run(self, OSCILLATOR.format(end=end, window=window, scheme=scheme, loader=loader, structure=structure)).end()
         self.assertEqual(run.code, 0, run.err)
-        found = run.quantities()
+        found = run.case.quantities()
         exact = [0.5 * (math.cos(2 * math.pi * end) + sign * math.cos(6 * math.pi * end)) for sign in (1, -1)]
         return math.hypot(found["left.u"] - exact[0], found["right.u"] - exact[1])
 
