@@ -22,7 +22,7 @@ class Solver final : public protocol::Participant {
   Solver(const io::Table& root, const std::string& name, std::unique_ptr<Team>& team);
   ~Solver() override;
 
-  protocol::Introduction introduce() const override { return {"liggghts", scene_.dimension, {}}; }
+  protocol::Introduction introduce() const override { return {"liggghts", scene_.dimension, {}, largest_step_}; }
   std::vector<protocol::Surface> start(const protocol::Run& run) override;
   protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override;
   std::vector<std::pair<std::string, double>> finish() override;

@@ -119,6 +119,11 @@ class Liggghts(unittest.TestCase):
         self.assertAlmostEqual(self.series("out", "below.force.z")[-20:].mean(), -weight, delta=1e-3 * weight)
         self.assertEqual(self.series("out", "particles")[-1], 1)
 
+    def test_windows_may_be_so_many_of_its_steps(self):
+        self.run_it(BOUNCE, ONE, ("window = 0.002", 'window = "steps:10"'), ("end = 0.2", "end = 0.02"), results="out")
+        summary = self.case.summary()
+        self.assertEqual(summary["participants"]["grains"]["steps"], 10 * summary["time"]["windows"])
+
     def test_the_linear_law_is_the_same_too(self):
         linear = [('normal = "hertz"', 'normal = { law = "linear", stiffness = 2e4 }'), ('tangential = "mindlin"', 'tangential = { law = "linear_slider", ratio = 3.5 }'),
                   *NO_ROLLING, ("velocity = [0, 0, -1]", "velocity = [0.4, 0, -1], spin = [0, 0, 3]")]
