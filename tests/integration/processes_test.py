@@ -36,9 +36,9 @@ STATIC = {
 }
 DYNAMIC = {
     "2D_P1_newmark": ('dimension = 2', 'mesh = { bar = { size = [1, 0.2], cells = [20, 4], simplices = true } }\ndegree = 1\nstep = 1e-3\nnewmark = { beta = 0.3, gamma = 0.6 }',
-                      '[structure.fix.x0]\n[structure.load.x1]\ntraction = [0, -1e6]\nramp = [0, 2e-3]'),
+                      '[structure.fix.x0]\n[structure.load.x1]\ntraction = [0, -1e6]\nramp = 2e-3'),
     "2D_Q2_generalised": ('dimension = 2', 'mesh = { bar = { size = [1, 0.2], cells = [10, 2] } }\ndegree = 2\nstep = 1e-3\ngeneralised_alpha = { spectral_radius = 0.8 }',
-                          '[structure.fix.x0]\n[structure.load.x1]\ntraction = [0, -1e6]\nramp = [0, 2e-3]'),
+                          '[structure.fix.x0]\n[structure.load.x1]\ntraction = [0, -1e6]\nramp = 2e-3'),
     "3D_Q1_moved": ('dimension = 3\ngravity = [0, 0, -9.81]',
                     'mesh = { bar = { size = [1, 0.2, 0.2], cells = [10, 2, 2] } }\ndegree = 1\nstep = 1e-3\nrayleigh = { mass = 2, stiffness = 1e-5 }',
                     '[structure.fix.x0]\n[structure.move.x1]\nvelocity = [0, 0, 0.1]'),
@@ -186,8 +186,8 @@ class ProcessesTest(unittest.TestCase):
         self.write("\n".join(hinge), "hinge.msh")
         case = CASE.format(head="dimension = 2", body='mesh = "hinge.msh"\ndegree = 2', end=1, more="", parts="[structure.fix.foot]\n[structure.load.head]\ntraction = [0, -1e6]")
         done = self.mpirun(2, f"{BIN}/acopla-fem", self.write(case))
-        self.assertNotEqual(done.returncode, 0, done.stdout)
-        self.assertIn("conjugate gradients", done.stderr)
+        self.assertEqual(done.returncode, 2, done.stderr + done.stdout)
+        self.assertEqual(done.stderr.count("is a mechanism"), 1, done.stderr)
         endless = CASE.format(head="dimension = 3", body='mesh = { bar = { size = [1, 0.2, 0.2], cells = [8, 2, 2] } }', end=1, more="",
                               parts="[structure.fix.x0]\n[structure.load.x1]\ntraction = [0, 0, -1e6]").replace("2.1e11", "1e308")
         done = self.mpirun(2, f"{BIN}/acopla-fem", self.write(endless))
