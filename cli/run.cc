@@ -362,7 +362,7 @@ int run(const RunOptions& options) {
   for (const auto& participant : read.participants) {
     if (participant.replay) continue;
     command_of(participant, options.case_file, "");  // says so before a results folder is made
-    ++processes;
+    processes += participant.processes;
   }
   std::string results;
   if (options.resume.empty()) {

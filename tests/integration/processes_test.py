@@ -262,6 +262,8 @@ class ProcessesTest(unittest.TestCase):
             with self.subTest(victim):
                 run = self.begin(end="1000")
                 for _ in range(1500):
+                    if run.poll() is not None:
+                        self.fail("the run ended by itself: " + run.communicate()[1])
                     ranks = {self.rank_of(pid): pid for pid, name in self.processes().items() if name == "acopla-fem"}
                     log = f"{self.folder}/results/interface.h5"
                     if len(ranks) == 2 and os.path.exists(log) and os.path.getsize(log) > 4000:
