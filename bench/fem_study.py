@@ -206,7 +206,7 @@ condition = {condition}
 def processes(study):
     import h5py
     import numpy as np
-    across = 4 if study.quick else 12
+    across = 4 if study.quick else 16
     environment = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
     rows, fields, kappa = [], {}, None
     for name, count, solver in (("one, direct", 1, "direct"), ("one, conjugate gradients", 1, "cg"), ("two", 2, "auto")):
