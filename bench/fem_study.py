@@ -38,6 +38,7 @@ def run(study):
     calculix(study, rows)
     if not study.quick:  # a speed near its target, which the tests' company would decide
         window(study)
+    processes(study)
     start_up(study)
     study.csv(["part", "element", "cells over the height", "steps", "unknowns", "error", "seconds", "peak MiB"], rows)
     draw(study, cantilevers, space, steps)
@@ -179,6 +180,64 @@ def window(study):
                 [["the factor, read once", f"{1e3 * cost['stream']:.2f}"], ["forward and back substitution", f"{1e3 * cost['solve']:.2f}"],
                  ["the whole window: products, substitution, reactions", f"{1e3 * cost['window']:.2f}"]])
     study.text(f"The factor L takes {cost['factor'] / 2 ** 20:.0f} MiB, the process {cost['mebibytes']:.0f} MiB. Substitution reads it twice, as L and as Lᵀ.")
+
+
+# --- the same case on one process and on two ---------------------------------------------------------------------------
+SHARED = """dimension = 3
+end = 1
+[structure]
+solver = "fem"
+mesh = {{ bar = {{ size = [1, 0.2, 0.2], cells = [{along}, {across}, {across}] }} }}
+degree = 1
+linear_solver = "{solver}"
+[structure.material]
+young = 2.1e11
+poisson = 0.3
+[structure.fix.x0]
+[structure.load.x1]
+traction = [0, 0, -1e6]
+[structure.output]
+vtu = false
+hdf5 = true
+condition = {condition}
+"""
+
+
+def processes(study):
+    import h5py
+    import numpy as np
+    across = 4 if study.quick else 16
+    environment = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
+    rows, fields, kappa = [], {}, None
+    for name, count, solver in (("one, direct", 1, "direct"), ("one, conjugate gradients", 1, "cg"), ("two", 2, "auto")):
+        folder = pathlib.Path(study.work) / f"shared-{count}-{solver}"
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        case = folder / "case.toml"
+        case.write_text(SHARED.format(along=5 * across, across=across, solver=solver, condition="true" if solver == "direct" else "false"))
+        command = ([] if count == 1 else ["mpirun", "-np", str(count)]) + [study.program("acopla-fem"), str(case), "--results", str(folder / "results")]
+        begin = time.perf_counter()
+        with open(folder / "out.txt", "w") as out:
+            process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, env=environment)
+            _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        seconds = time.perf_counter() - begin
+        if process.returncode != 0:
+            study.at_most("Two processes: difference from one [κ ε]", "–", None, 10.0)
+            return
+        values = {w[0]: float(w[1]) for w in map(str.split, (folder / "out.txt").read_text().splitlines()) if len(w) == 2}
+        kappa = values.get("condition", kappa)
+        found = []
+        with h5py.File(folder / "results/structure.h5") as file:
+            file.visititems(lambda path, item: found.append(item[-1]) if path.endswith("displacement") and isinstance(item, h5py.Dataset) else None)
+        fields[name] = np.array(found[0])
+        rows.append([name, f"{int(values['dofs'])}", seconds, values.get("memory.largest", 1024 * usage.ru_maxrss) / 2 ** 20])
+    scale = np.abs(fields["one, direct"]).max() * kappa * np.finfo(float).eps
+    differences = {name: np.abs(field - fields["one, direct"]).max() / scale for name, field in fields.items()}
+    study.at_most("Two processes: difference from one with its direct solver [κ ε]", "–", differences["two"], 10.0, "{:.2g}")
+    study.table(f"A bar in bending on one process and on two (κ = {kappa:.3g}; memory is the largest peak of a process; the direct solver also found κ, by 12 more solutions)",
+                ["processes", "unknowns", "difference from the direct solver [κ ε]", "run time [s]", "peak memory of a process [MiB]"],
+                [[name, unknowns, f"{differences[name]:.2g}", f"{seconds:.2f}", f"{mebibytes:.0f}"] for name, unknowns, seconds, mebibytes in rows])
 
 
 def start_up(study):

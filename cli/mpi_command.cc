@@ -19,6 +19,8 @@ void run_on_processes(Command& command, int processes, const std::string& case_f
   command.words = std::move(words);
   for (const char* allow : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"}) command.environment.emplace_back(allow, "1");
   command.environment.emplace_back("OMPI_MCA_mpi_yield_when_idle", "1");
+  // When one dies mpirun ends the others, after a pause for them to tidy up that a death to be told within 2 s does not have.
+  command.environment.emplace_back("OMPI_MCA_odls_base_sigkill_timeout", "0");
 }
 
 }  // namespace acopla::cli

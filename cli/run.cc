@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "cli/display.h"
+#include "cli/mpi_command.h"
 #include "cli/participants.h"
 #include "cli/process.h"
 #include "cli/workplace.h"
@@ -362,7 +363,7 @@ int run(const RunOptions& options) {
   for (const auto& participant : read.participants) {
     if (participant.replay) continue;
     command_of(participant, options.case_file, "");  // says so before a results folder is made
-    ++processes;
+    processes += participant.solver.empty() ? 1 : processes_of(options.case_file, participant.name);
   }
   std::string results;
   if (options.resume.empty()) {

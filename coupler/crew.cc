@@ -357,6 +357,7 @@ void Crew::take_advance(Member& member, protocol::Advance advance) {
 void Crew::take_end(Member& member, const Message& message) {
   pulse_.forget(member.about->name);
   for (const auto& [name, value] : protocol::read_values(message.body)) {
+    if (name == "processes" && value >= 1 && value < 1e6) member.outcome.processes = static_cast<int>(value);
     if (name == "peak_bytes" && value >= 0 && value < 1e18)
       member.outcome.peak_bytes = static_cast<std::uint64_t>(value);
     else

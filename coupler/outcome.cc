@@ -28,7 +28,8 @@ Json participants_of(const Outcome& outcome) {
                              {"seconds", participant.seconds},
                              {"seconds_waiting", participant.seconds_waiting},
                              {"steps", participant.steps},
-                             {"peak_bytes", participant.peak_bytes}};
+                             {"peak_bytes", participant.peak_bytes},
+                             {"processes", participant.processes}};
   return map;
 }
 

@@ -40,7 +40,8 @@ struct ParticipantOutcome {
   double seconds_waiting = 0;   ///< without a request, while the run went on [s]
   double seconds_starting = 0;  ///< of `seconds`, from welcome to the surfaces [s]
   std::uint64_t steps = 0;
-  std::uint64_t peak_bytes = 0;
+  std::uint64_t peak_bytes = 0;  ///< of the process that speaks
+  int processes = 1;             ///< that it is made of, as it says
 };
 
 /// Σ force of an interface in its last window, for the table at the end.

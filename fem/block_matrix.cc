@@ -30,7 +30,7 @@ BlockMatrix::BlockMatrix(std::shared_ptr<const CoupledNodes> pattern, int dimens
 void BlockMatrix::add(std::span<const std::uint32_t> cell, const Eigen::MatrixXd& matrix) {
   const int d = dimension_;
   for (std::size_t a = 0; a < cell.size(); ++a)
-    for (std::size_t b = 0; b < cell.size(); ++b) {
+    for (std::size_t b = 0; pattern_->has(cell[a]) && b < cell.size(); ++b) {
       double* block = values_.data() + size() * pattern_->pair(cell[a], cell[b]);
       for (int i = 0; i < d; ++i)
         for (int j = 0; j < d; ++j)

@@ -19,7 +19,7 @@ class BlockMatrix {
   /// A zero matrix.
   BlockMatrix(std::shared_ptr<const CoupledNodes> pattern, int dimension);
 
-  /// Adds a cell's matrix, of d unknowns a node of `cell`.
+  /// Adds a cell's matrix, in the rows that the pattern has: of d unknowns a node of `cell`.
   void add(std::span<const std::uint32_t> cell, const Eigen::MatrixXd& matrix);
 
   /// result = this · x.

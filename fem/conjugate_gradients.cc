@@ -6,14 +6,15 @@
 #include <mpi.h>
 
 #include <Epetra_MultiVector.h>
-#include <Eigen/Geometry>
 #include <Teuchos_ParameterList.hpp>
 
 #include <cstdlib>
+#include <numeric>
 #include <stdexcept>
 
 #include "fem/dealii_error.h"
 #include "fem/linear_solver.h"
+#include "fem/rigid_modes.h"
 
 namespace acopla::fem {
 namespace {
@@ -64,28 +65,6 @@ std::unique_ptr<TrilinosMatrix> copy_supported(const BlockMatrix& matrix, const 
   return result;
 }
 
-int rigid_mode_count(int dimension) { return dimension == 2 ? 3 : 6; }
-
-/// The rigid-body modes at the free unknowns, mode after mode: moves, then turns (about z in 2D).
-std::vector<double> rigid_modes(const Mesh& mesh, const Fixed& fixed) {
-  const int dimension = mesh.dimension();
-  const auto size = fixed.size();
-  std::vector<double> modes(static_cast<std::size_t>(rigid_mode_count(dimension)) * size, 0.0);
-  Vec3 centre = Vec3::Zero();
-  for (const auto& p : mesh.points()) centre += p / static_cast<double>(mesh.nodes());
-  for (std::size_t n = 0; n < mesh.nodes(); ++n)
-    for (int d = 0; d < dimension; ++d) {
-      const auto i = static_cast<std::size_t>(dimension) * n + static_cast<std::size_t>(d);
-      if (fixed[i]) continue;
-      auto mode = static_cast<std::size_t>(d);
-      modes[mode * size + i] = 1;
-      mode = static_cast<std::size_t>(dimension);
-      for (int axis = dimension == 2 ? 2 : 0; axis < 3; ++axis)
-        modes[mode++ * size + i] = Vec3(Vec3::Unit(axis)).cross(mesh.points()[n] - centre)[d];
-    }
-  return modes;
-}
-
 /// y = K x among the free unknowns.
 struct FreeOperator {
   const BlockMatrix& matrix;
@@ -108,18 +87,16 @@ class ConjugateGradients : public LinearSolver {
   void prepare() override {
     start_mpi();
     copy_ = copy_supported(matrix_, fixed_);
-    modes_ = rigid_modes(mesh_, fixed_);
-    // deal.II 9.4 passes on constant modes only; ML's own list takes the turns as well.
+    std::vector<std::uint32_t> nodes(mesh_.nodes());
+    std::iota(nodes.begin(), nodes.end(), 0u);
+    modes_ = rigid_modes(mesh_, nodes, fixed_);
     dealii::TrilinosWrappers::PreconditionAMG::AdditionalData data;
     data.elliptic = true;
     data.aggregation_threshold = 0.02;
     Teuchos::ParameterList list;
     std::unique_ptr<Epetra_MultiVector> unused;
     data.set_parameters(list, unused, *copy_);
-    list.set("PDE equations", mesh_.dimension());
-    list.set("null space: type", "pre-computed");
-    list.set("null space: dimension", rigid_mode_count(mesh_.dimension()));
-    list.set("null space: vectors", modes_.data());
+    set_rigid_modes(list, mesh_.dimension(), modes_);
     multigrid_ = std::make_unique<dealii::TrilinosWrappers::PreconditionAMG>();
     multigrid_->initialize(*copy_, list);
   }

@@ -26,12 +26,15 @@ CellsOfNodes invert(std::size_t nodes, std::span<const std::uint32_t> cell_nodes
 
 CoupledNodes::CoupledNodes(std::size_t nodes, std::span<const std::uint32_t> cell_nodes,
                            std::size_t nodes_a_cell)
+    : CoupledNodes(nodes, cell_nodes, nodes_a_cell, std::vector<char>(nodes, 1)) {}
+
+CoupledNodes::CoupledNodes(std::size_t nodes, std::span<const std::uint32_t> cell_nodes, std::size_t nodes_a_cell, const std::vector<char>& rows)
     : starts_(nodes + 1, 0) {
   const auto owners = invert(nodes, cell_nodes, nodes_a_cell);
   std::vector<std::uint32_t> neighbours;
   for (std::size_t n = 0; n < nodes; ++n) {
     neighbours.clear();
-    for (auto i = owners.starts[n]; i < owners.starts[n + 1]; ++i) {
+    for (auto i = owners.starts[n]; rows[n] && i < owners.starts[n + 1]; ++i) {
       const auto cell = cell_nodes.subspan(owners.cells[i] * nodes_a_cell, nodes_a_cell);
       neighbours.insert(neighbours.end(), cell.begin(), cell.end());
     }

@@ -4,6 +4,8 @@
 
 #include <stdexcept>
 
+#include "fem/condition.h"
+
 namespace acopla::fem {
 
 Scheme Scheme::newmark(double beta, double gamma) {
@@ -34,9 +36,12 @@ Scheme Scheme::generalised_alpha(double spectral_radius) {
 Dynamics::Dynamics(const Mesh& mesh, const BlockMatrix& stiffness, const MassMatrix& mass,
                    const Rayleigh& damping, const Supports& supports, const Loads& loads,
                    const Scheme& scheme, const SolverOptions& options)
+    : Dynamics(mesh, std::make_shared<LocalMatrices>(mesh, supports.fixed(), stiffness, &mass), damping, supports, loads, scheme, options) {}
+
+Dynamics::Dynamics(const Mesh& mesh, std::shared_ptr<const Matrices> matrices, const Rayleigh& damping, const Supports& supports,
+                   const Loads& loads, const Scheme& scheme, const SolverOptions& options)
     : mesh_(mesh),
-      stiffness_(stiffness),
-      mass_(mass),
+      matrices_(std::move(matrices)),
       damping_(damping),
       supports_(supports),
       loads_(loads),
@@ -51,17 +56,32 @@ void Dynamics::prepare(double step) {
   const double b = scheme_.beta * step, f = 1 - scheme_.alpha_f;
   const double m = (1 - scheme_.alpha_m) / (b * step) + f * scheme_.gamma / b * damping_.mass;
   const double k = f * (1 + scheme_.gamma / b * damping_.stiffness);
-  effective_ = {};  // before its matrix goes
-  matrix_ = std::make_unique<BlockMatrix>(combine(k, stiffness_, m, mass_));
-  effective_ = choose_solver(*matrix_, mesh_, supports_.fixed(), options_);
+  of_stiffness_ = k;
+  of_mass_ = m;
+  effective_ = {};  // before the next is made
+  effective_ = matrices_->solver(k, m, options_);
   effective_.solver->prepare();
   ++factorisations_;
-  if (effective_.direct) matrix_.reset();  // the factor is all that is needed
+  if (effective_.direct) effective_.matrix.reset();  // the factor is all that is needed
   if (scheme_.average_acceleration() || mass_solver_.solver) return;
-  mass_blocks_ = std::make_unique<BlockMatrix>(combine(0, stiffness_, 1, mass_));
-  mass_solver_ = choose_solver(*mass_blocks_, mesh_, supports_.fixed(), options_);
+  mass_solver_ = matrices_->solver(0, 1, options_);
   mass_solver_.solver->prepare();
-  if (mass_solver_.direct) mass_blocks_.reset();
+  if (mass_solver_.direct) mass_solver_.matrix.reset();
+}
+
+double Dynamics::condition() const {
+  Vector product;
+  return condition_number(
+      [&](const Vector& x, Vector& result) {
+        matrices_->stiffness(of_stiffness_ * x, result);
+        matrices_->mass(of_mass_ * x, product);
+        result += product;
+      },
+      [&](const Vector& x, Vector& result) {
+        result.resize(0);
+        effective_.solver->solve(x, result);
+      },
+      supports_.fixed());
 }
 
 /// Accelerations at the window's start: of free unknowns from M a = F̄ − K u − C v, of held ones as
@@ -75,8 +95,8 @@ void Dynamics::begin(Motion& motion, const Vector& mean_force) {
   } else {
     Vector held = mesh_.zero();
     supports_.accelerate(motion.time, held);
-    stiffness_.multiply(motion.displacement + damping_.stiffness * motion.velocity, K_x_);
-    mass_.multiply(damping_.mass * motion.velocity + held, M_x_);
+    matrices_->stiffness(motion.displacement + damping_.stiffness * motion.velocity, K_x_);
+    matrices_->mass(damping_.mass * motion.velocity + held, M_x_);
     mass_solver_.solver->solve(mean_force + loads_.at(motion.time) - K_x_ - M_x_,
                                motion.acceleration);
     motion.acceleration += held;
@@ -104,8 +124,8 @@ void Dynamics::midpoint_step(Motion& motion, const Vector& mean_force, double st
       if (supports_.fixed()[static_cast<std::size_t>(i)]) M_arg_[i] = 2 / step * (v[i] - speed_[i]);
     M_arg_ -= 2 / step * damping_.mass * held_;
   }
-  stiffness_.multiply(K_arg_, K_x_);
-  mass_.multiply(M_arg_, M_x_);
+  matrices_->stiffness(K_arg_, K_x_);
+  matrices_->mass(M_arg_, M_x_);
   right_ = 2 * (mean_force + loads_.mean(motion.time, end)) - K_x_ + M_x_;
   if (!effective_.direct) change_ = step * v;
   effective_.solver->solve(right_, change_);
@@ -138,8 +158,8 @@ void Dynamics::newmark_step(Motion& motion, const Vector& mean_force, double ste
       }
   }
   const Vector rate = (1 - af) * v1 + af * v;
-  stiffness_.multiply((1 - af) * u1 + af * u + damping_.stiffness * rate, K_x_);
-  mass_.multiply((1 - am) * a1 + am * a + damping_.mass * rate, M_x_);
+  matrices_->stiffness((1 - af) * u1 + af * u + damping_.stiffness * rate, K_x_);
+  matrices_->mass((1 - am) * a1 + am * a + damping_.mass * rate, M_x_);
   right_ = mean_force + (1 - af) * loads_.at(end) + af * loads_.at(motion.time) - K_x_ - M_x_;
   if (!effective_.direct) change_ = step * v;
   effective_.solver->solve(right_, change_);
@@ -188,8 +208,8 @@ Vector Dynamics::reactions(const Vector& u0, const Vector& v0, const Vector& mea
   if (held_nodes_.empty()) return result;
   const Vector rate = (end.displacement - u0) / length;
   Vector product = result;
-  stiffness_.multiply(mean_u + damping_.stiffness * rate, held_nodes_, result);
-  mass_.multiply((end.velocity - v0) / length + damping_.mass * rate, held_nodes_, product);
+  matrices_->stiffness(mean_u + damping_.stiffness * rate, held_nodes_, result);
+  matrices_->mass((end.velocity - v0) / length + damping_.mass * rate, held_nodes_, product);
   result += product - load;
   for (Eigen::Index i = 0; i < result.size(); ++i)
     if (!supports_.fixed()[static_cast<std::size_t>(i)]) result[i] = 0;
@@ -203,11 +223,11 @@ void Dynamics::add_exchange(const Vector& u0, const Vector& v0, const Motion& en
   energy.work += load.dot(change);
   Vector product;
   if (damping_.mass != 0) {
-    mass_.multiply(change, product);
+    matrices_->mass(change, product);
     energy.damping += damping_.mass / step * change.dot(product);
   }
   if (damping_.stiffness != 0) {
-    stiffness_.multiply(change, product);
+    matrices_->stiffness(change, product);
     energy.damping += damping_.stiffness / step * change.dot(product);
   }
   if (supports_.moving())
@@ -218,9 +238,9 @@ void Dynamics::add_exchange(const Vector& u0, const Vector& v0, const Motion& en
 Energy Dynamics::energy(const Motion& motion) const {
   Vector product;
   Energy result;
-  mass_.multiply(motion.velocity, product);
+  matrices_->mass(motion.velocity, product);
   result.kinetic = 0.5 * motion.velocity.dot(product);
-  stiffness_.multiply(motion.displacement, product);
+  matrices_->stiffness(motion.displacement, product);
   result.strain = 0.5 * motion.displacement.dot(product);
   return result;
 }

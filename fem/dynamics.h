@@ -7,6 +7,7 @@
 #include "fem/block_matrix.h"
 #include "fem/linear_solver.h"
 #include "fem/loads.h"
+#include "fem/matrices.h"
 #include "fem/supports.h"
 
 namespace acopla::fem {
@@ -68,6 +69,9 @@ class Dynamics {
   Dynamics(const Mesh& mesh, const BlockMatrix& stiffness, const MassMatrix& mass,
            const Rayleigh& damping, const Supports& supports, const Loads& loads,
            const Scheme& scheme, const SolverOptions& options);
+  /// The same on matrices wherever they are.
+  Dynamics(const Mesh& mesh, std::shared_ptr<const Matrices> matrices, const Rayleigh& damping, const Supports& supports,
+           const Loads& loads, const Scheme& scheme, const SolverOptions& options);
 
   /// Analyses and factors the effective matrix of this step [s], unless it is the one before; the
   /// mass too where the scheme needs accelerations. @throws as LinearSolver::prepare
@@ -90,6 +94,7 @@ class Dynamics {
   /// Energies of a motion, kinetic and strain [J].
   Energy energy(const Motion& motion) const;
 
+  double condition() const;  ///< κ of the effective matrix at free unknowns, after prepare()
   const ChosenSolver& solver() const { return effective_; }
   std::size_t factorisations() const { return factorisations_; }
 
@@ -103,8 +108,7 @@ class Dynamics {
                     double step, Energy& energy) const;
 
   const Mesh& mesh_;
-  const BlockMatrix& stiffness_;
-  const MassMatrix& mass_;
+  std::shared_ptr<const Matrices> matrices_;
   Rayleigh damping_;
   const Supports& supports_;
   const Loads& loads_;
@@ -112,7 +116,7 @@ class Dynamics {
   SolverOptions options_;
   std::vector<std::uint32_t> held_nodes_;
   double step_ = 0;
-  std::unique_ptr<BlockMatrix> matrix_, mass_blocks_;
+  double of_stiffness_ = 0, of_mass_ = 0;  // the effective matrix is that much of each
   ChosenSolver effective_, mass_solver_;
   std::size_t factorisations_ = 0;
   Vector K_arg_, M_arg_, K_x_, M_x_, right_, change_, held_,

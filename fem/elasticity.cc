@@ -43,6 +43,7 @@ void add_stiffness(const Mesh& mesh, const Materials& materials, const Formulati
   const bool b_bar = formulation.locking == Formulation::Locking::b_bar;
   Eigen::MatrixXd columns, products, cell_matrix(d * nodes, d * nodes);
   for (std::size_t c = 0; c < mesh.cells(); ++c) {
+    if (!stiffness.pattern()->touches(mesh.cell(c))) continue;
     const auto x = mesh.positions<d>(c);
     const auto& material = materials.of(c);
     const double mu = material.mu();
@@ -87,8 +88,11 @@ double depth(const Mesh& mesh, const Formulation& formulation) {
 BlockMatrix assemble_stiffness(const Mesh& mesh, const Materials& materials,
                                const Formulation& formulation) {
   const auto nodes = static_cast<std::size_t>(mesh.element().nodes);
-  BlockMatrix stiffness(std::make_shared<CoupledNodes>(mesh.nodes(), mesh.cell_nodes(), nodes),
-                        mesh.dimension());
+  return assemble_stiffness(mesh, materials, formulation, std::make_shared<CoupledNodes>(mesh.nodes(), mesh.cell_nodes(), nodes));
+}
+
+BlockMatrix assemble_stiffness(const Mesh& mesh, const Materials& materials, const Formulation& formulation, std::shared_ptr<const CoupledNodes> pattern) {
+  BlockMatrix stiffness(std::move(pattern), mesh.dimension());
   with_dimension(mesh.dimension(),
                  [&](auto d) { add_stiffness<d>(mesh, materials, formulation, stiffness); });
   return stiffness;
@@ -101,6 +105,7 @@ MassMatrix assemble_mass(const Mesh& mesh, const Materials& materials,
   const auto& table = mesh.element().mass;
   with_dimension(mesh.dimension(), [&](auto d) {
     for (std::size_t c = 0; c < mesh.cells(); ++c) {
+      if (!mass.pattern()->touches(mesh.cell(c))) continue;
       const double density = materials.of(c).density.value_or(0.0) * depth(mesh, formulation);
       const Eigen::VectorXd weights = masses<d>(table, mesh.positions<d>(c), density);
       mass.add(mesh.cell(c), table.values * weights.asDiagonal() * table.values.transpose());

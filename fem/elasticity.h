@@ -13,8 +13,11 @@ namespace acopla::fem {
 BlockMatrix assemble_stiffness(const Mesh& mesh, const Materials& materials,
                                const Formulation& formulation = {});
 
+/// The same in the rows of a pattern of one's own.
+BlockMatrix assemble_stiffness(const Mesh& mesh, const Materials& materials, const Formulation& formulation, std::shared_ptr<const CoupledNodes> pattern);
+
 /// Consistent mass ∫ ρ N_a N_b dV [kg]; a material without a density has none.
-/// @param pattern  of the stiffness
+/// @param pattern  of the stiffness; only the rows that it has are there
 MassMatrix assemble_mass(const Mesh& mesh, const Materials& materials,
                          const Formulation& formulation,
                          std::shared_ptr<const CoupledNodes> pattern);

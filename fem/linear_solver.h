@@ -38,6 +38,8 @@ struct ChosenSolver {
   double factor_bytes = 0;  ///< of the Cholesky factor, exact; 0 when CG was asked for
   double flops = 0;         ///< of the factorisation
   std::string why;          ///< e.g. "its factor of 0.2 GiB is below the limit of 4 GiB"
+  /// What was made for this solver alone; a direct one that is prepared does without.
+  std::shared_ptr<const BlockMatrix> matrix = {};
 };
 
 /// @param matrix  of the free body; it, the mesh and `fixed` must outlive the solver

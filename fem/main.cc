@@ -1,5 +1,3 @@
 #include "fem/program.h"
 
-int main(int argc, char** argv) {
-  return acopla::protocol::run_program(argc, argv, acopla::fem::program());
-}
+int main(int argc, char** argv) { return acopla::fem::run(argc, argv); }

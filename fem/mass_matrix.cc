@@ -22,7 +22,7 @@ MassMatrix::MassMatrix(std::shared_ptr<const CoupledNodes> pattern, int dimensio
 
 void MassMatrix::add(std::span<const std::uint32_t> cell, const Eigen::MatrixXd& matrix) {
   for (std::size_t a = 0; a < cell.size(); ++a)
-    for (std::size_t b = 0; b < cell.size(); ++b)
+    for (std::size_t b = 0; pattern_->has(cell[a]) && b < cell.size(); ++b)
       values_[pattern_->pair(cell[a], cell[b])] += matrix(static_cast<int>(a), static_cast<int>(b));
 }
 

@@ -267,6 +267,7 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   settings.supports = read_supports(table, settings);
   settings.loads = read_loads(table, settings.mesh.groups, settings.dimension);
   settings.solver = read_solver(table);
+  settings.processes = static_cast<int>(table.integer("processes", 1, 4096, 1));
   const auto output = table.table_or_empty("output");
   settings.vtu = output.flag("vtu", true);
   settings.hdf5 = output.flag("hdf5", false);
@@ -280,6 +281,9 @@ Settings read_settings(const io::Table& root, const std::string& name) {
   if (settings.frequencies > 0)
     for (const auto& [part, group, material] : settings.materials)
       if (!material.density) part.fail("has no density [kg/m3], which natural frequencies need.");
+  settings.condition = output.flag("condition", false);
+  if (settings.condition && settings.formulation.large)
+    output.fail("condition", "belongs to displacements = \"small\": large ones have another matrix in every iteration.");
   if (settings.energy && !settings.motion)
     output.fail("energy", "belongs to analysis = \"dynamic\".");
   table.reject_unknown();

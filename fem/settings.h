@@ -79,6 +79,8 @@ struct Settings {
   std::vector<Torque> torques;
   bool reactions = false;       ///< report the reaction of each support
   std::size_t frequencies = 0;  ///< lowest natural frequencies to report at the end
+  bool condition = false;       ///< report the condition number of the matrix that is solved with, at the end
+  int processes = 1;            ///< that `acopla run` starts; who else starts them, mpirun, counts itself
   bool energy = false;          ///< report the energy balance of a structure in motion
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fem/condition.h"
+
 namespace acopla::fem {
 namespace {
 
@@ -16,16 +18,25 @@ Statics::Statics(const Mesh& mesh, const Materials& materials, const Fixed& fixe
                  const SolverOptions& options, const Formulation& formulation)
     : fixed_(fixed),
       own_(std::make_unique<BlockMatrix>(assemble_stiffness(mesh, materials, formulation))),
-      stiffness_(*own_),
-      norm_(stiffness_.norm()),
-      chosen_(choose_solver(stiffness_, mesh, fixed, options)) {}
+      matrices_(std::make_shared<LocalMatrices>(mesh, fixed, *own_)),
+      norm_(matrices_->norm()),
+      chosen_(matrices_->solver(1, 0, options)) {}
 
 Statics::Statics(const Mesh& mesh, const BlockMatrix& stiffness, const Fixed& fixed,
                  const SolverOptions& options)
-    : fixed_(fixed),
-      stiffness_(stiffness),
-      norm_(stiffness_.norm()),
-      chosen_(choose_solver(stiffness_, mesh, fixed, options)) {}
+    : Statics(std::make_shared<LocalMatrices>(mesh, fixed, stiffness), fixed, options) {}
+
+Statics::Statics(std::shared_ptr<const Matrices> matrices, const Fixed& fixed, const SolverOptions& options)
+    : fixed_(fixed), matrices_(std::move(matrices)), norm_(matrices_->norm()), chosen_(matrices_->solver(1, 0, options)) {}
+
+double Statics::condition() const {
+  return condition_number([&](const Vector& x, Vector& result) { matrices_->stiffness(x, result); },
+                          [&](const Vector& x, Vector& result) {
+                            result.resize(0);
+                            chosen_.solver->solve(x, result);
+                          },
+                          fixed_);
+}
 
 double Statics::free_residual(const Vector& residual) const {
   double largest = 0;
@@ -37,7 +48,7 @@ double Statics::free_residual(const Vector& residual) const {
 StaticSolution Statics::solve(const Vector& load, const Vector& guess,
                               const Vector& prescribed) const {
   StaticSolution result;
-  result.dimension = stiffness_.dimension();
+  result.dimension = matrices_->dimension();
   result.displacement = guess;
   if (prescribed.size() == 0) {
     chosen_.solver->solve(load, result.displacement);
@@ -46,13 +57,13 @@ StaticSolution Statics::solve(const Vector& load, const Vector& guess,
     Vector held = Vector::Zero(load.size()), right;
     for (std::size_t i = 0; i < fixed_.size(); ++i)
       if (fixed_[i]) held[static_cast<Eigen::Index>(i)] = prescribed[static_cast<Eigen::Index>(i)];
-    stiffness_.multiply(held, right);
+    matrices_->stiffness(held, right);
     right = load - right;
     chosen_.solver->solve(right, result.displacement);
     result.displacement += held;
   }
   const auto backward_error = [&] {
-    stiffness_.multiply(result.displacement, result.reaction);
+    matrices_->stiffness(result.displacement, result.reaction);
     result.reaction -= load;
     const double scale =
         norm_ * result.displacement.lpNorm<Eigen::Infinity>() + load.lpNorm<Eigen::Infinity>();

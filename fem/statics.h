@@ -3,6 +3,7 @@
 
 #include "fem/elasticity.h"
 #include "fem/linear_solver.h"
+#include "fem/matrices.h"
 
 namespace acopla::fem {
 
@@ -25,6 +26,8 @@ class Statics {
   /// The same with a stiffness that is there already and outlives this.
   Statics(const Mesh& mesh, const BlockMatrix& stiffness, const Fixed& fixed,
           const SolverOptions& options);
+  /// The same on matrices wherever they are.
+  Statics(std::shared_ptr<const Matrices> matrices, const Fixed& fixed, const SolverOptions& options);
 
   /// Factors, or builds the preconditioner.
   void prepare() { chosen_.solver->prepare(); }
@@ -34,7 +37,7 @@ class Statics {
   StaticSolution solve(const Vector& load, const Vector& guess = {},
                        const Vector& prescribed = {}) const;
 
-  const BlockMatrix& stiffness() const { return stiffness_; }
+  double condition() const;  ///< κ of the stiffness at free unknowns, after prepare()
   const ChosenSolver& solver() const { return chosen_; }
 
  private:
@@ -42,7 +45,7 @@ class Statics {
 
   const Fixed& fixed_;
   std::unique_ptr<const BlockMatrix> own_;
-  const BlockMatrix& stiffness_;
+  std::shared_ptr<const Matrices> matrices_;
   double norm_;
   ChosenSolver chosen_;
 };

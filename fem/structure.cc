@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "fem/cholesky.h"
+#include "fem/distributed/distributed_matrices.h"
 #include "fem/finite_strain.h"
 #include "fem/interface.h"
 #include "fem/large_motion.h"
@@ -37,36 +38,42 @@ class Stopwatch {
 
 struct Structure::Body {
   Model model;
-  BlockMatrix stiffness;
+  std::optional<BlockMatrix> stiffness;  // and the mass: of this process alone, not of a team
+  std::optional<MassMatrix> mass;
+  std::shared_ptr<const Matrices> matrices;  // not of large displacements
   Stress stress;
   std::optional<Statics> statics;
   std::optional<LargeDisplacements> large;  // instead, and to start a motion from
-  std::optional<MassMatrix> mass;           // of a structure in motion, as one of the next
+  // Of a structure in motion one of the next.
   std::optional<Dynamics> dynamics;
   std::optional<LargeMotion> large_motion;
 
-  Body(const Settings& settings, const Vec3& gravity)
+  Body(const Settings& settings, const Vec3& gravity, Team* team)
       : model(settings, gravity),
-        stiffness(stiffness_of(settings, model)),
         stress(model.mesh, model.materials, settings.formulation) {
     const bool is_large = settings.formulation.large;
+    if (team) {
+      matrices = std::make_shared<DistributedMatrices>(*team, settings, model, settings.motion.has_value());
+    } else {
+      stiffness.emplace(stiffness_of(settings, model));
+      if (settings.motion) mass.emplace(assemble_mass(model.mesh, model.materials, settings.formulation, stiffness->pattern()));
+      matrices = std::make_shared<LocalMatrices>(model.mesh, model.supports.fixed(), *stiffness, mass ? &*mass : nullptr);
+    }
     if (is_large && (!settings.motion || settings.motion->from_equilibrium))
       large.emplace(model.mesh, model.materials, model.supports.fixed(), settings.solver,
                     settings.formulation);
     if (!settings.motion) {
-      if (!is_large) statics.emplace(model.mesh, stiffness, model.supports.fixed(), settings.solver);
+      if (!is_large) statics.emplace(matrices, model.supports.fixed(), settings.solver);
       return;
     }
-    mass.emplace(
-        assemble_mass(model.mesh, model.materials, settings.formulation, stiffness.pattern()));
     if (is_large)
       large_motion.emplace(model.mesh, model.materials, *mass, settings.motion->damping, model.supports,
                            model.loads, settings.solver, settings.formulation);
     else
-      dynamics.emplace(model.mesh, stiffness, *mass, settings.motion->damping, model.supports,
-                       model.loads, settings.motion->scheme, settings.solver);
+      dynamics.emplace(model.mesh, matrices, settings.motion->damping, model.supports, model.loads,
+                       settings.motion->scheme, settings.solver);
   }
-  bool moves() const { return mass.has_value(); }
+  bool moves() const { return dynamics || large_motion; }
   Energy energy(const Motion& motion) const { return dynamics ? dynamics->energy(motion) : large_motion->energy(motion); }
 };
 
@@ -76,7 +83,9 @@ struct Structure::Coupled {
   Interface interface;
 };
 
-Structure::Structure(Settings settings) : settings_(std::move(settings)) {}
+Structure::Structure(Settings settings, Team* team) : settings_(std::move(settings)), team_(team) {
+  if (team_ || settings_.processes > 1) refuse_unshared(settings_);
+}
 Structure::~Structure() = default;
 
 protocol::Introduction Structure::introduce() const {
@@ -133,7 +142,7 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
     settings_.table.fail("thickness",
                          "must be 1 in a coupling: forces between participants in 2D are those of "
                          "a metre of depth.");
-  body_ = std::make_unique<Body>(settings_, Vec3(run.gravity[0], run.gravity[1], run.gravity[2]));
+  body_ = std::make_unique<Body>(settings_, Vec3(run.gravity[0], run.gravity[1], run.gravity[2]), team_);
   if (const auto doubt = doubtful_size(body_->model.mesh); !doubt.empty())
     fmt::print(stderr, "{}: warning: {}.mesh: {}\n", settings_.table.location("mesh").text(), settings_.name, doubt);
   std::vector<protocol::Surface> surfaces;
@@ -153,11 +162,13 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   // What explicit schemes must know; nobody asks where nothing is sent back.
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     const auto& [use, interface] = coupled_[k];
-    if (!body_->mass || use.sends.empty()) continue;
+    if (!body_->moves() || use.sends.empty()) continue;
     const auto& held = body_->model.supports.fixed();
-    for (const auto node : interface.nodes()) {
+    const auto sudden_masses = body_->matrices->sudden(interface.nodes());
+    for (std::size_t i = 0; i < sudden_masses.size(); ++i) {
       Vec3 mass = Vec3::Zero();
-      const double sudden = body_->mass->sudden(node);
+      const auto node = interface.nodes()[i];
+      const double sudden = sudden_masses[i];
       for (int d = 0; d < settings_.dimension; ++d)
         if (!held[static_cast<std::size_t>(settings_.dimension) * node + static_cast<std::size_t>(d)]) mass[d] = sudden;
       surfaces[k].mass.push_back(mass);
@@ -294,7 +305,7 @@ void Structure::begin_motion() {
       motion.displacement = body_->large->solve(load, motion.displacement).displacement;
       body_->large.reset();  // a motion does without
     } else {
-      Statics statics(mesh, body_->stiffness, supports.fixed(), settings_.solver);
+      Statics statics(body_->matrices, supports.fixed(), settings_.solver);
       statics.prepare();
       motion.displacement = statics.solve(load, {}, motion.displacement).displacement;
     }
@@ -545,6 +556,13 @@ std::vector<std::pair<std::string, double>> Structure::finish() {
     result.emplace_back("factorisations", static_cast<double>(body_->large_motion->factorisations()));
   else
     result.emplace_back("residual", worst_residual_);
+  if (settings_.condition) result.emplace_back("condition", body_->dynamics ? body_->dynamics->condition() : body_->statics->condition());
+  if (team_) {
+    const auto memory = peak_memory(*team_);
+    result.emplace_back("processes", team_->size());
+    result.emplace_back("memory.largest", memory.largest);
+    result.emplace_back("memory.sum", memory.sum);
+  }
   for (auto& frequency : frequencies()) result.push_back(std::move(frequency));
   return result;
 }
@@ -554,8 +572,8 @@ std::vector<std::pair<std::string, double>> Structure::frequencies() const {
   if (settings_.frequencies == 0) return result;
   const auto& [mesh, materials, supports, loads] = body_->model;
   const auto mass =
-      assemble_mass(mesh, materials, settings_.formulation, body_->stiffness.pattern());
-  const auto modes = natural_modes(mesh, body_->stiffness, mass, supports.fixed(),
+      assemble_mass(mesh, materials, settings_.formulation, body_->stiffness->pattern());
+  const auto modes = natural_modes(mesh, *body_->stiffness, mass, supports.fixed(),
                                    settings_.frequencies, settings_.solver);
   for (std::size_t m = 0; m < modes.size(); ++m)
     result.emplace_back(fmt::format("frequency.{}", m + 1), modes[m].frequency);
@@ -612,9 +630,13 @@ std::string explain(const Settings& settings) {
   const Model model(settings, Vec3::Zero());
   const auto& mesh = model.mesh;
   const auto& fixed = model.supports.fixed();
+  if (settings.processes > 1) refuse_unshared(settings);
   const auto stiffness = stiffness_of(settings, model);
   // A matrix in motion has the same pattern as the stiffness, and so the same factor.
-  const auto solver = choose_solver(stiffness, mesh, fixed, settings.solver);
+  auto options = settings.solver;
+  if (settings.processes > 1) options.kind = SolverOptions::Kind::cg;
+  auto solver = choose_solver(stiffness, mesh, fixed, options);
+  if (settings.processes > 1) solver.why = fmt::format("it runs on {} processes", settings.processes);
   const double mass = mass_of(settings, model);
   std::string text = fmt::format(
       "{}: {} {} elasticity{}, {} {} of degree {}, {} nodes, {} unknowns ({} held)\n"
@@ -640,7 +662,8 @@ std::string explain(const Settings& settings) {
   const double matrices = settings.motion ? 3.2 : 2;
   const double memory =
       matrices * stiffness.bytes() + (solver.direct ? solver.factor_bytes : stiffness.bytes());
-  text += fmt::format("  memory: about {:.2g} GiB\n", memory / (1ull << 30) + 0.2);
+  text += fmt::format("  memory: about {:.2g} GiB{}\n", memory / settings.processes / (1ull << 30) + 0.2,
+                      settings.processes > 1 ? fmt::format(" in each of {} processes, and the mesh in all of them", settings.processes) : "");
   if (solver.direct)
     text += fmt::format("  time: about {:.2g} s to factor, {:.2g} s a {}\n",
                         solver.flops / (factor_share * blas_rate()),

@@ -13,6 +13,8 @@
 
 namespace acopla::fem {
 
+class Team;
+
 /// An elastic structure under the mean forces of each window, its weight and its own loads: in
 /// static equilibrium with them, or in motion. Receives "force", sends "displacement" and
 /// "velocity" (zero of a static one) on physical surfaces of its mesh, lines in 2D. Reports
@@ -22,7 +24,8 @@ namespace acopla::fem {
 /// Reactions and loads of a structure in motion are means over the window.
 class Structure : public protocol::Participant {
  public:
-  explicit Structure(Settings settings);
+  /// @param team  of several processes, whose first this is, that share the matrices; null: this process has them all. It must outlive this.
+  explicit Structure(Settings settings, Team* team = nullptr);
   ~Structure() override;
 
   protocol::Introduction introduce() const override;
@@ -80,6 +83,7 @@ class Structure : public protocol::Participant {
   };
 
   Settings settings_;
+  Team* team_ = nullptr;
   protocol::Run run_;
   std::unique_ptr<Body> body_;
   std::vector<Coupled> coupled_;
