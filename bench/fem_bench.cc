@@ -203,30 +203,6 @@ void deck(int cells, const std::string& file) {
   if (!out.flush()) throw std::runtime_error("cannot write " + file);
 }
 
-/// Largest and, by the inverse, smallest eigenvalue of the stiffness among the free unknowns, to some per cent.
-double condition(const Statics& statics, const Fixed& fixed) {
-  const auto& K = statics.stiffness();
-  Vector x = Vector::Random(static_cast<Eigen::Index>(fixed.size())), y;
-  const auto release = [&](Vector& v) {
-    for (std::size_t i = 0; i < fixed.size(); ++i)
-      if (fixed[i]) v[static_cast<Eigen::Index>(i)] = 0;
-  };
-  double largest = 0, inverse = 0;
-  release(x);
-  for (int k = 0; k < 100; ++k) {
-    K.multiply(x, y);
-    release(y);
-    largest = y.norm() / x.norm();
-    x = y / y.norm();
-  }
-  for (int k = 0; k < 20; ++k) {
-    statics.solver().solver->solve(x, y);
-    inverse = y.norm() / x.norm();
-    x = y / y.norm();
-  }
-  return largest * inverse;
-}
-
 void compare(int cells, const std::string& file) {
   const Mesh mesh(build(bar(3, 0.1, cells)), 1);
   const auto fixed = clamped(mesh);
@@ -254,7 +230,7 @@ void compare(int cells, const std::string& file) {
     const auto u = statics.solve(end_shear(mesh)).displacement;
     const double scale = u.lpNorm<Eigen::Infinity>();
     line += fmt::format("\"{}\": {:.6g}, ", b_bar ? "b_bar" : "plain", (u - theirs).lpNorm<Eigen::Infinity>() / scale);
-    if (!b_bar) line += fmt::format("\"condition\": {:.6g}, \"rounding\": {:.6g}, ", condition(statics, fixed), rounding / scale);
+    if (!b_bar) line += fmt::format("\"condition\": {:.6g}, \"rounding\": {:.6g}, ", statics.condition(), rounding / scale);
   }
   fmt::print("{}\"unknowns\": {}}}\n", line, mesh.unknowns());
 }

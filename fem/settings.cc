@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "fem/baseline.h"
+
 namespace acopla::fem {
 namespace {
 
@@ -91,7 +93,10 @@ MotionHistory read_history(const io::Table& table, MotionHistory::Gives gives) {
   if (gives == Gives::accelerations) {
     if (table.choice("baseline", {"corrected", "raw"}, "corrected") == "corrected") history.amplitude = correct_baseline(history.amplitude);
   } else if (table.has("baseline")) {
-    table.fail("baseline", "belongs to an acceleration.");
+    if (gives != Gives::velocities || history.amplitude.constant())
+      table.fail("baseline", "belongs to a record of velocities or accelerations, or to their amplitude over time. Leave it out.");
+    // Kept unless asked: a velocity may mean to go on.
+    if (table.choice("baseline", {"corrected", "raw"}, "raw") == "corrected") history.amplitude = correct_velocities(history.amplitude);
   }
   return history;
 }

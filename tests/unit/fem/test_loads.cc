@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include <Eigen/Geometry>
 
 #include "cells.h"
+#include "fem/baseline.h"
 #include "fem/faces.h"
 #include "fem/model.h"
 #include "fem/statics.h"
@@ -343,10 +345,33 @@ TEST(ARecord, OfAccelerationsIsIntegratedTwice) {
   EXPECT_GT(std::abs(MotionHistory{Amplitude(shaken), MotionHistory::Gives::accelerations}.displacement(5)), 0.2);
 }
 
+// A shake that begins and ends at rest and returns, plus the drift of a velocity at the start and of a zero of the accelerations that was
+// wrong by 0.02 and grew by 0.01 a second: the corrected record is the shake alone, to round-off.
+TEST(ARecord, OfVelocitiesLosesAKnownDrift) {
+  const auto shake = [](double t) { return std::sin(std::numbers::pi * t) * std::sin(2 * std::numbers::pi * t / 4); };
+  std::vector<std::pair<double, double>> clean, drifting;
+  for (int n = 0; n <= 400; ++n) {
+    const double t = 0.01 * n;
+    clean.emplace_back(1 + t, shake(t));
+    drifting.emplace_back(1 + t, shake(t) + 0.3 + 0.02 * t + 0.005 * t * t);
+  }
+  ASSERT_NEAR(Amplitude(clean).integral(5), 0, 1e-14);
+  const MotionHistory corrected{correct_velocities(Amplitude(drifting)), MotionHistory::Gives::velocities};
+  for (const auto& [t, v] : clean) EXPECT_NEAR(corrected.velocity(t), v, 1e-13) << t;
+  EXPECT_NEAR(corrected.displacement(5), 0, 1e-13);
+  EXPECT_NEAR(corrected.displacement(9), 0, 1e-13);
+  EXPECT_GT(MotionHistory({Amplitude(drifting), MotionHistory::Gives::velocities}).displacement(5), 1.2);
+  // Nothing but drift leaves nothing, between the points of two as well.
+  const auto nothing = correct_velocities(Amplitude({{0, 1}, {4, 3}}));
+  for (const auto& [t, v] : nothing.points()) EXPECT_EQ(v, 0) << t;
+}
+
 TEST_F(BadInput, OfAccelerationsIsLocatedAndSaysWhatToDo) {
   expect("[structure.move.z0]\nacceleration = [1, 0, 0]\n", {"case.toml:9:", "structure.move.z0.acceleration needs a record"});
   expect("[structure.move.z0]\nacceleration = [1, 0, 0]\nvelocity = [1, 0, 0]\n", {"has both velocity and acceleration"});
-  expect("[structure.move.z0]\nvelocity = [1, 0, 0]\nbaseline = \"raw\"\n", {"structure.move.z0.baseline belongs to an acceleration"});
+  expect("[structure.move.z0]\nvelocity = [1, 0, 0]\nbaseline = \"raw\"\n", {"structure.move.z0.baseline belongs to a record of velocities or accelerations"});
+  expect("[structure.move.z0]\ndisplacement = [1, 0, 0]\namplitude = [[0, 0], [1, 1]]\nbaseline = \"corrected\"\n", {"structure.move.z0.baseline belongs to a record"});
+  expect("[structure.move.z0]\nvelocity = [1, 0, 0]\namplitude = [[0, 0], [1, 1], [2, 0]]\nbaseline = \"corrected\"\n", {"no error"});
   expect("[structure.move.z0]\nacceleration = [1, 0, 0]\namplitude = [[0, 0], [1, 1], [2, 0]]\n", {"no error"});
 }
 
