@@ -97,12 +97,12 @@ void TwoWay::step_serially(WindowRecord& window) {
   Forces none;
   gather(structures_.size(), window, none, end);
   const auto start = std::exchange(now_, std::move(end));
-  const auto moved = moved_on(start);
   const auto next = window_ + window.ticks;
   begun_ = next < std::min(case_.windows, case_.next_checkpoint(window_));
+  const double length = span_.length();
   span_.go_on(stability_, next);
   if (begun_) begin_next(next);
-  book(window, window, start, moved, now_);
+  book(window, window, start, moved_on(start, length), now_);
 }
 
 // A scene pays for keeping its state where its windows find their length by themselves, and only while a first contact may be too stiff for it.
@@ -120,8 +120,9 @@ void TwoWay::load(WindowRecord& window, Forces& forces, Motions& end) {
     gather(loaders_.size(), window, forces, end);
     window.ticks = span_.ticks();
     const auto pushes = [](const auto& surface) { return size_of(surface.second) > 0; };
+    if (!saved_) break;
     const bool met = std::any_of(forces.begin(), forces.end(), pushes);
-    if (!saved_ || !span_.too_long(stability_, met)) break;
+    if (!span_.too_long(stability_, met)) break;
     crew_.restore(loaders_);
     span_.shorten(stability_, met);
     window = {};
@@ -140,7 +141,7 @@ void TwoWay::step_in_parallel(WindowRecord& window) {
   gather(loaders_.size() + structures_.size(), window, forces, end);
   if (estimates(window_)) check_stability();
   balance(window);
-  book(window, last_, now_, moved_on(now_), end);
+  book(window, last_, now_, moved_on(now_, span_.length()), end);
   now_ = std::move(end);
   last_.forces = window.forces;
   last_.arrived = window.arrived;
@@ -153,7 +154,7 @@ void TwoWay::step_with_iterations(WindowRecord& window) {
   crew_.save(everybody);
   acceleration_->begin_window();
   jump_.begin_window();
-  auto assumed = flat(moved_on(now_));
+  auto assumed = flat(moved_on(now_, span_.length()));
   const auto start = flat(now_);
   std::vector<double> residuals;
   double force_change = 0;
@@ -232,10 +233,10 @@ void TwoWay::give_up(const std::vector<double>& residuals, double force_change) 
 }
 
 // Where the loaders' surfaces go by themselves: on with their velocity.
-TwoWay::Motions TwoWay::moved_on(const Motions& start) const {
+TwoWay::Motions TwoWay::moved_on(const Motions& start, double length) const {
   auto motions = start;
   for (auto& [surface, motion] : motions)
-    for (std::size_t k = 0; k < motion.displacement.size(); ++k) motion.displacement[k] += span_.length() * motion.velocity[k];
+    for (std::size_t k = 0; k < motion.displacement.size(); ++k) motion.displacement[k] += length * motion.velocity[k];
   return motions;
 }
 

@@ -63,7 +63,7 @@ class TwoWay final : public Scheme {
   void balance(WindowRecord& window) const;
   /// The work of a window, and its motion where that is asked for. @param acting  whose forces loaded the structures
   void book(WindowRecord& window, const WindowRecord& acting, const Motions& start, const Motions& moved_to, const Motions& end) const;
-  Motions moved_on(const Motions& start) const;
+  Motions moved_on(const Motions& start, double length) const;
   void carry(const Link& link, const Motions& motions, Motion& moved) const;
   double work_at_sender(const Link& link, const WindowRecord& window, const Motions& start, const Motions& moved_to) const;
   bool agree(const Forces& forces, const Forces& before, double& change) const;
