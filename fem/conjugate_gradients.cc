@@ -12,6 +12,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "fem/balance.h"
 #include "fem/dealii_error.h"
 #include "fem/linear_solver.h"
 #include "fem/rigid_modes.h"
@@ -110,7 +111,13 @@ class ConjugateGradients : public LinearSolver {
         if (u.size() == f.size()) x[i] = u[i];
       }
     const double norm = right.l2_norm();
-    if (norm > 0) iterate(right, norm, x);
+    if (norm > 0) {
+      iterate(right, norm, x);
+      DealVector residual(size);
+      FreeOperator{matrix_, fixed_}.vmult(residual, x);
+      residual -= right;
+      check_balance(residual.linfty_norm(), right.linfty_norm(), x.linfty_norm());
+    }
     u = Vector::Zero(f.size());
     if (norm > 0)
       for (unsigned i = 0; i < size; ++i) u[i] = x[i];

@@ -13,11 +13,11 @@
 #include <limits>
 #include <stdexcept>
 
+#include "fem/balance.h"
 #include "fem/block_matrix.h"
 #include "fem/dealii_error.h"
 #include "fem/distributed/communicators.h"
 #include "fem/rigid_modes.h"
-#include "io/error.h"
 
 namespace acopla::fem {
 namespace {
@@ -139,12 +139,8 @@ void SharedSystem::solve(const Vector& f, Vector& u) {
     s.iterate(residual, share * residual.l2_norm(), correction);
     x += correction;
   }
-  // Displacements so large that the rounding of K u is of the load's size balance nothing.
-  constexpr double no_balance = 1e-3;
   s.matrix->residual(residual, x, right);
-  if (const double left = s.largest(residual) / load; !(left < no_balance))
-    throw io::UserError(fmt::format("the structure is a mechanism, or nearly: displacements of {:.2g} m leave {:.2g} of the load without balance. Hold or join the part that "
-                                    "moves; one process with linear_solver = \"direct\" names the place.", s.largest(x), left));
+  check_balance(s.largest(residual), load, s.largest(x));
   for (std::size_t i = 0; i < s.fixed.size(); ++i)
     if (!s.fixed[i]) u[static_cast<Eigen::Index>(i)] = values(x)[i];
 }

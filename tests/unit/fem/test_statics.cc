@@ -164,6 +164,22 @@ TEST(Statics, RefusesAMechanismAndSaysWhereItIs) {
     EXPECT_GE(std::stod(found[2]), 1) << text;
     EXPECT_GT(std::stod(found[1]) + std::stod(found[2]), 2) << text;
   }
+
+  // Conjugate gradients meet no pivot, and converge to something.
+  SolverOptions iterations;
+  iterations.kind = SolverOptions::Kind::cg;
+  Statics iterated(mesh, steel, fixed, iterations);
+  iterated.prepare();
+  Vector load = mesh.zero();
+  load.tail<3>() = Vec3(1e3, 0, 0);
+  try {
+    iterated.solve(load);
+    FAIL();
+  } catch (const io::UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("the structure is a mechanism"), std::string::npos) << error.what();
+  } catch (const std::runtime_error& error) {  // or to nothing
+    EXPECT_NE(std::string(error.what()).find("did not converge"), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace
