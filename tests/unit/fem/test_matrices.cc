@@ -8,6 +8,7 @@
 #include "cells.h"
 #include "fem/condition.h"
 #include "fem/elasticity.h"
+#include "fem/large_memory.h"
 #include "gmsh_writer.h"
 
 namespace acopla::fem::test {
@@ -74,4 +75,21 @@ TEST(LocalMatricesTest, SolveWithSums) {
 }
 
 }  // namespace
+TEST(LargeMemory, IsAlignedToALargePageAndMovesAsAnyOther) {
+  for (const std::size_t bytes : {std::size_t{100}, std::size_t{3} << 20, (std::size_t{9} << 20) + 1}) {
+    auto* memory = static_cast<char*>(allocate_large(bytes));
+    ASSERT_NE(memory, nullptr);
+    const bool large = bytes > std::size_t{4} << 20;
+    EXPECT_TRUE(!large || reinterpret_cast<std::uintptr_t>(memory) % (std::size_t{2} << 20) == 0);
+    memory[0] = 'a';
+    memory[bytes - 1] = 'z';
+    memory = static_cast<char*>(std::realloc(memory, 2 * bytes));  // as CHOLMOD does
+    ASSERT_NE(memory, nullptr);
+    EXPECT_EQ(memory[0], 'a');
+    EXPECT_EQ(memory[bytes - 1], 'z');
+    std::free(memory);
+  }
+  EXPECT_THROW(LargeMemory<double>().allocate(std::size_t{1} << 58), std::bad_alloc);
+}
+
 }  // namespace acopla::fem::test
