@@ -88,7 +88,7 @@ class Examination {
     ends_with_error("malformed", "bytes that are no message", [](Rehearsal& stage) { stage.say_bytes({"\xc1 no message"}); });
     ends_with_error("other-version", "a request of version 2", [](Rehearsal& stage) {
       auto frames = frames_of(stage.advance_request(0, stage.zero_fields()));
-      frames.front()[8] = 2;  // 85 a6 "acopla" 01: the first value of the map (docs/protocol.md, §8)
+      frames.front()[8] = 2;  // 85 a6 "acopla" 01: the first value of the map (docs/protocol.md, §9)
       stage.say_bytes(frames);
     });
     scene("refusal", [this] { refused(); });

@@ -223,7 +223,10 @@ void Crew::hear_member(Member& member, const Message& message) {
   if (member.phase != Phase::starting && message.sequence != member.sequence)
     fail(member,
          fmt::format("answered request {} while {} was asked", message.sequence, member.sequence));
-  if (message.kind == Kind::interface) take_surfaces(member, protocol::read_interface(message));
+  if (message.kind == Kind::interface) {
+    if (protocol::found_memory(message)) hub_.use_memory(member.peer);
+    take_surfaces(member, protocol::read_interface(message));
+  }
   if (message.kind == Kind::advanced) take_advance(member, protocol::read_advanced(message));
   if (message.kind != Kind::done) return;
   if (member.phase == Phase::returning) enter(member, Phase::idle, "waiting for the others");
@@ -295,7 +298,7 @@ void Crew::admit(const std::string& peer, const Message& message) {
 void Crew::welcome(Member& member) {
   enter(member, Member::Phase::starting, "starting");
   pulse_.expect(member.about->name);
-  if (!hub_.send(member.peer, protocol::welcome_message(run_for(*member.about), pulse_.endpoint())))
+  if (!hub_.send(member.peer, protocol::welcome_message(run_for(*member.about), pulse_.endpoint(), hub_.offer_memory(member.peer))))
     fail(member, "is gone right after its hello");
 }
 

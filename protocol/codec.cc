@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
@@ -133,38 +134,64 @@ Body unpack_header(const Frame& frame, const Limits& limits) {
   }
 }
 
-Array read_array(const Body& entry_of, const Frame& frame) {
-  if (!entry_of.is_object()) throw ProtocolError("an array's entry in the header is not a map");
-  const auto name = entry(entry_of, "name", &Body::is_string, "text").get<std::string>();
-  const auto mesh = entry(entry_of, "mesh", &Body::is_string, "text").get<std::string>();
-  const auto type = named(all_types, entry(entry_of, "type", &Body::is_string, "text").get<std::string>(), "type");
+/// What the header says of an array.
+struct Entry {
+  std::string name, mesh;
+  ArrayType type = ArrayType::f8;
   std::vector<std::uint64_t> shape;
-  std::uint64_t bytes = bytes_of(type), without_zeros = bytes;
-  const auto& extents = entry(entry_of, "shape", &Body::is_array, "list");
+  std::uint64_t bytes = 0;
+};
+
+Entry read_entry(const Body& map) {
+  if (!map.is_object()) throw ProtocolError("an array's entry in the header is not a map");
+  Entry read;
+  read.name = entry(map, "name", &Body::is_string, "text").get<std::string>();
+  read.mesh = entry(map, "mesh", &Body::is_string, "text").get<std::string>();
+  read.type = named(all_types, entry(map, "type", &Body::is_string, "text").get<std::string>(), "type");
+  std::uint64_t without_zeros = read.bytes = bytes_of(read.type);
+  const auto& extents = entry(map, "shape", &Body::is_array, "list");
   constexpr std::size_t most_extents = 32;  // what NumPy can hold
-  if (extents.size() > most_extents) throw ProtocolError(fmt::format("array {} has an impossible shape", name));
+  if (extents.size() > most_extents) throw ProtocolError(fmt::format("array {} has an impossible shape", read.name));
   for (const auto& extent : extents) {
-    if (!extent.is_number_unsigned()) throw ProtocolError(fmt::format("array {} has a shape that is not of counts", name));
-    shape.push_back(extent.get<std::uint64_t>());
+    if (!extent.is_number_unsigned()) throw ProtocolError(fmt::format("array {} has a shape that is not of counts", read.name));
+    const auto count = extent.get<std::uint64_t>();
+    read.shape.push_back(count);
     // Compared before use: a product that overflows or is larger than the frame never allocates anything.
     // Extents beside a zero too: readers in other languages multiply them before they see it.
-    if (shape.back() != 0 && without_zeros > (std::uint64_t{1} << 48) / shape.back())
-      throw ProtocolError(fmt::format("array {} has an impossible shape", name));
-    bytes *= shape.back();
-    if (shape.back() != 0) without_zeros *= shape.back();
+    if (count != 0 && without_zeros > (std::uint64_t{1} << 48) / count)
+      throw ProtocolError(fmt::format("array {} has an impossible shape", read.name));
+    read.bytes *= count;
+    if (count != 0) without_zeros *= count;
   }
-  if (bytes != frame.size)
-    throw ProtocolError(fmt::format("array {} on {} should have {} bytes by its shape, but has {}", name, mesh, bytes, frame.size));
-  if (reinterpret_cast<std::uintptr_t>(frame.data) % bytes_of(type) == 0)
-    return Array::view(name, mesh, type, std::move(shape), frame.owner, frame.data);
+  return read;
+}
+
+Array array_of(Entry read, const Frame& frame) {
+  if (read.bytes != frame.size)
+    throw ProtocolError(fmt::format("array {} on {} should have {} bytes by its shape, but has {}", read.name, read.mesh, read.bytes, frame.size));
+  if (reinterpret_cast<std::uintptr_t>(frame.data) % bytes_of(read.type) == 0)
+    return Array::view(std::move(read.name), std::move(read.mesh), read.type, std::move(read.shape), frame.owner, frame.data);
   const std::shared_ptr<std::byte[]> copy(new std::byte[frame.size]);
   std::memcpy(copy.get(), frame.data, frame.size);
-  return Array::view(name, mesh, type, std::move(shape), copy, copy.get());
+  return Array::view(std::move(read.name), std::move(read.mesh), read.type, std::move(read.shape), copy, copy.get());
 }
+
+/// The part of a shared memory where an entry says that its array lies.
+Frame frame_at(const Body& map, const Entry& read, SharedMemory* memory) {
+  if (!memory) throw ProtocolError(fmt::format("array {} on {} lies in shared memory, which was not agreed on", read.name, read.mesh));
+  const auto at = entry(map, "at", &Body::is_number_unsigned, "count").get<std::uint64_t>();
+  const auto contents = memory->contents();
+  if (at < SharedMemory::arrays_begin || read.bytes > contents.size() || at > contents.size() - read.bytes)
+    throw ProtocolError(fmt::format("array {} on {}: {} bytes at {} are not within the {} of the shared memory", read.name, read.mesh, read.bytes, at,
+                                    contents.size()));
+  return {nullptr, contents.data() + at, static_cast<std::size_t>(read.bytes)};
+}
+
+bool is_in_memory(const Body& map) { return map.is_object() && map.contains("at"); }
 
 }  // namespace
 
-std::string encode_header(const Message& message) {
+std::string encode_header(const Message& message, std::span<const std::uint64_t> offsets) {
   msgpack::sbuffer buffer;
   Packer packer(buffer);
   packer.pack_map(5);
@@ -178,8 +205,9 @@ std::string encode_header(const Message& message) {
   pack_value(packer, message.body);
   pack_text(packer, "arrays");
   packer.pack_array(static_cast<std::uint32_t>(message.arrays.size()));
-  for (const auto& array : message.arrays) {
-    packer.pack_map(4);
+  for (std::size_t k = 0; k < message.arrays.size(); ++k) {
+    const auto& array = message.arrays[k];
+    packer.pack_map(offsets.empty() ? 4 : 5);
     pack_text(packer, "name");
     pack_text(packer, array.name());
     pack_text(packer, "mesh");
@@ -189,11 +217,14 @@ std::string encode_header(const Message& message) {
     pack_text(packer, "shape");
     packer.pack_array(static_cast<std::uint32_t>(array.shape().size()));
     for (const auto extent : array.shape()) packer.pack(extent);
+    if (offsets.empty()) continue;
+    pack_text(packer, "at");
+    packer.pack(offsets[k]);
   }
   return {buffer.data(), buffer.size()};
 }
 
-Message decode(std::span<const Frame> frames, const Limits& limits) {
+Message decode(std::span<const Frame> frames, const Limits& limits, SharedMemory* memory) {
   if (frames.empty()) throw ProtocolError("a message without frames");
   const auto header = unpack_header(frames[0], limits);
   const auto& spoken = entry(header, "acopla", &Body::is_number_unsigned, "count");
@@ -206,9 +237,15 @@ Message decode(std::span<const Frame> frames, const Limits& limits) {
   message.body = entry(header, "body", &Body::is_object, "map");
   const auto& arrays = entry(header, "arrays", &Body::is_array, "list");
   if (arrays.size() > limits.arrays) throw ProtocolError(fmt::format("{} arrays in one message", arrays.size()));
-  if (arrays.size() + 1 != frames.size())
-    throw ProtocolError(fmt::format("the header names {} arrays, {} frames follow", arrays.size(), frames.size() - 1));
-  for (std::size_t k = 0; k < arrays.size(); ++k) message.arrays.push_back(read_array(arrays[k], frames[k + 1]));
+  const auto framed = arrays.size() - static_cast<std::size_t>(std::count_if(arrays.begin(), arrays.end(), is_in_memory));
+  if (framed + 1 != frames.size())
+    throw ProtocolError(fmt::format("the header names {} arrays, {} frames follow", framed, frames.size() - 1));
+  auto frame = frames.begin();
+  for (const auto& map : arrays) {
+    auto read = read_entry(map);
+    const auto lies = is_in_memory(map) ? frame_at(map, read, memory) : *++frame;
+    message.arrays.push_back(array_of(std::move(read), lies));
+  }
   return message;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "protocol/message.h"
+#include "protocol/shared_memory.h"
 
 namespace acopla::protocol {
 
@@ -28,11 +29,13 @@ struct Frame {
 };
 
 /// The header frame of a message; the arrays' bytes follow it as they are.
-std::string encode_header(const Message& message);
+/// @param offsets  where in shared memory each array lies instead; empty: none does
+std::string encode_header(const Message& message, std::span<const std::uint64_t> offsets = {});
 
 /// Reads a message back. Array bytes are used in place where they are aligned and copied where they are not.
-/// @param frames  the header and one frame per array
+/// @param frames  the header and one frame per array that does not lie in shared memory
+/// @param memory  in which the sender may have laid arrays, which are read in place and overwritten by its next message; null: none was agreed on
 /// @throws ProtocolError for anything that is not exactly one well-formed message
-Message decode(std::span<const Frame> frames, const Limits& limits = {});
+Message decode(std::span<const Frame> frames, const Limits& limits = {}, SharedMemory* memory = nullptr);
 
 }  // namespace acopla::protocol

@@ -46,8 +46,8 @@ std::vector<Vec3> vectors(const Array& array) {
   const auto flat = array.doubles();
   const auto* first = reinterpret_cast<const Vec3*>(flat.data());
   std::vector<Vec3> values(first, first + flat.size() / 3);
-  // x − x is zero for what is finite, and NaN for the rest.
-  const Eigen::Map<const Eigen::ArrayXd> all(flat.data(), static_cast<Eigen::Index>(flat.size()));
+  // x − x is zero for what is finite, and NaN for the rest. Of the copy, as memory that is shared may change.
+  const Eigen::Map<const Eigen::ArrayXd> all(reinterpret_cast<const double*>(values.data()), static_cast<Eigen::Index>(3 * values.size()));
   if (!((all - all).sum() == 0))
     for (std::size_t k = 0; k < values.size(); ++k)
       if (!values[k].allFinite()) throw ProtocolError(fmt::format("{} on {} is not finite at point {}", array.name(), array.mesh(), k));
@@ -98,7 +98,7 @@ Hello read_hello(const Message& message) {
   return hello;
 }
 
-Message welcome_message(const Run& run, const std::string& pulse_endpoint) {
+Message welcome_message(const Run& run, const std::string& pulse_endpoint, const std::optional<MemoryOffer>& memory) {
   Message message;
   message.kind = Kind::welcome;
   Body uses = Body::array();
@@ -108,6 +108,7 @@ Message welcome_message(const Run& run, const std::string& pulse_endpoint) {
                   {"gravity", run.gravity}, {"results", run.results}, {"uses", uses},
                   {"pulse", pulse_endpoint}};
   if (run.resumes) message.body["resumes"] = true;
+  if (memory) message.body["memory"] = {{"requests", memory->requests}, {"answers", memory->answers}, {"token", memory->token}};
   return message;
 }
 
@@ -128,6 +129,12 @@ Welcome read_welcome(const Message& message) {
                                 value<std::vector<std::string>>(message, use, "sends")});
   welcome.pulse_endpoint = value<std::string>(message, body, "pulse");
   welcome.run.resumes = body.contains("resumes") && value<bool>(message, body, "resumes");
+  if (body.contains("memory")) {
+    const auto offer = value<Body>(message, body, "memory");
+    if (!offer.is_object()) throw ProtocolError("\"memory\" of welcome is not a map");
+    welcome.memory = {value<std::string>(message, offer, "requests"), value<std::string>(message, offer, "answers"),
+                      value<std::uint64_t>(message, offer, "token")};
+  }
   return welcome;
 }
 
@@ -140,7 +147,7 @@ Message folder_message(Kind kind, const std::string& folder) {
 
 std::string read_folder(const Message& message) { return value<std::string>(message, message.body, "folder"); }
 
-Message interface_message(const std::vector<Surface>& surfaces) {
+Message interface_message(const std::vector<Surface>& surfaces, bool memory) {
   Message message;
   message.kind = Kind::interface;
   Body names = Body::array();
@@ -159,8 +166,11 @@ Message interface_message(const std::vector<Surface>& surfaces) {
     if (!surface.mass.empty()) message.arrays.push_back(vectors("mass", surface.name, surface.mass));
   }
   message.body = {{"surfaces", names}};
+  if (memory) message.body["memory"] = true;
   return message;
 }
+
+bool found_memory(const Message& interface) { return interface.body.contains("memory") && value<bool>(interface, interface.body, "memory"); }
 
 std::vector<Surface> read_interface(const Message& message) {
   std::vector<Surface> surfaces;

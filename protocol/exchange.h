@@ -1,7 +1,10 @@
 // Between the structures of C++ and the messages of the protocol: one place for each body's layout (docs/protocol.md, §4).
 #pragma once
 
+#include <optional>
+
 #include "protocol/participant.h"
+#include "protocol/shared_memory.h"
 
 namespace acopla::protocol {
 
@@ -13,14 +16,18 @@ struct Hello {
 };
 Hello read_hello(const Message& message);
 
-Message welcome_message(const Run& run, const std::string& pulse_endpoint);
+Message welcome_message(const Run& run, const std::string& pulse_endpoint, const std::optional<MemoryOffer>& memory = {});
 struct Welcome {
   Run run;
   std::string pulse_endpoint;
+  std::optional<MemoryOffer> memory;
 };
 Welcome read_welcome(const Message& message);
 
-Message interface_message(const std::vector<Surface>& surfaces);
+/// @param memory  the memory that was offered is there
+Message interface_message(const std::vector<Surface>& surfaces, bool memory = false);
+/// @return whether the participant has found the memory that it was offered
+bool found_memory(const Message& interface);
 std::vector<Surface> read_interface(const Message& message);
 
 /// `checkpoint` or `resume`.

@@ -60,13 +60,30 @@ std::optional<Arrival> Hub::receive(std::chrono::milliseconds wait) {
   if (!parcel) return std::nullopt;
   Arrival arrival{std::move(parcel->identity), std::nullopt, {}};
   try {
-    arrival.message = decode(parcel->frames);
+    const auto shared = shared_.find(arrival.peer);
+    arrival.message = decode(parcel->frames, {}, shared == shared_.end() ? nullptr : shared->second.memory.answers.get());
   } catch (const ProtocolError& error) {
     arrival.fault = error.what();
   }
   return arrival;
 }
 
-bool Hub::send(const std::string& peer, const Message& message) { return protocol::send(socket_, message, peer); }
+bool Hub::send(const std::string& peer, const Message& message) {
+  const auto shared = shared_.find(peer);
+  return protocol::send(socket_, message, peer, shared != shared_.end() && shared->second.found ? shared->second.memory.requests.get() : nullptr);
+}
+
+std::optional<MemoryOffer> Hub::offer_memory(const std::string& peer) {
+  if (!endpoint_.starts_with("ipc://")) return std::nullopt;
+  auto memory = MemoryPair::create();
+  if (!memory.is_there()) return std::nullopt;
+  auto offer = memory.offer();
+  shared_[peer] = {std::move(memory), false};
+  return offer;
+}
+
+void Hub::use_memory(const std::string& peer) {
+  if (const auto shared = shared_.find(peer); shared != shared_.end()) shared->second.found = true;
+}
 
 }  // namespace acopla::protocol

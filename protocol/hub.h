@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "protocol/keys.h"
 #include "protocol/message.h"
+#include "protocol/shared_memory.h"
 
 namespace acopla::protocol {
 
@@ -29,6 +31,10 @@ class Hub {
   std::optional<Arrival> receive(std::chrono::milliseconds wait);
   /// @return false when the peer is gone
   bool send(const std::string& peer, const Message& message);
+  /// Memory to share with a peer of this machine, that is over ipc; its answers may lie in it at once. Nothing where there is none.
+  std::optional<MemoryOffer> offer_memory(const std::string& peer);
+  /// The peer has found it: requests may lie in it, too.
+  void use_memory(const std::string& peer);
   /// For a poll together with other descriptors.
   zmq::socket_t& socket() { return socket_; }
 
@@ -36,6 +42,11 @@ class Hub {
   std::unique_ptr<Gate> gate_;  // before the socket that asks it
   zmq::socket_t socket_;
   std::string endpoint_;
+  struct Shared {
+    MemoryPair memory;
+    bool found = false;  // by the peer
+  };
+  std::map<std::string, Shared> shared_;  // by peer
 };
 
 /// Binds a socket and says so in a sentence when it cannot.

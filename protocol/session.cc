@@ -50,6 +50,7 @@ class Session::Line {
       if (message.kind != Kind::welcome) out_of_turn(message);
       auto welcome = read_welcome(message);
       run_ = std::move(welcome.run);
+      shares_memory_ = welcome.memory && channel_.use(*welcome.memory);
       pulse_.emplace(context_, reachable(welcome.pulse_endpoint, options_.endpoint), options_.name, keys_ ? &*keys_ : nullptr);
       state_ = "starting";
     });
@@ -60,7 +61,7 @@ class Session::Line {
 
   void offer(const std::vector<Surface>& surfaces) {
     for (const auto& surface : surfaces) points_[surface.name] = surface.mesh.points.size();
-    channel_.send(interface_message(surfaces));
+    channel_.send(interface_message(surfaces, shares_memory_));
     state_ = "ready";
   }
 
@@ -192,6 +193,7 @@ class Session::Line {
   std::vector<Field> received_;
   std::uint64_t sequence_ = 0;  // of the request that is under way
   std::string state_ = "connected";
+  bool shares_memory_ = false;  // with the coupler
   bool coupler_knows_ = false;  // that it is over
 };
 

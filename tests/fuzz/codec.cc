@@ -68,8 +68,9 @@ void read_body(const Message& message) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const auto memory = SharedMemory::create(0);
   try {
-    const auto message = decode(cut(data, size));
+    const auto message = decode(cut(data, size), {}, memory.get());
     encode_header(message);
     read_body(message);
   } catch (const ProtocolError&) {

@@ -10,6 +10,7 @@
 #include "coupler/stability.h"
 #include "tests/integration/in_process.h"
 #include "tests/integration/oscillator.h"
+#include "tests/integration/stubs.h"
 
 namespace acopla {
 namespace {
@@ -494,6 +495,45 @@ TEST(TwoWay, WhoCannotReturnIsRefusedForImplicitAtOnce) {
   ASSERT_TRUE(outcome.error);
   EXPECT_EQ(outcome.error->participant, "second");
   EXPECT_NE(outcome.error->message.find("cannot return to the start of a window"), std::string::npos) << outcome.error->message;
+}
+
+// A plate of many points that answers in a way which no two points share.
+class Plate final : public protocol::Participant {
+ public:
+  Plate(std::string surface, std::vector<std::string> sends) : surface_(std::move(surface)), sends_(std::move(sends)) {}
+  protocol::Introduction introduce() const override { return {"plate", 3, {}, 0}; }
+  std::vector<protocol::Surface> start(const protocol::Run&) override { return {{surface_, mesh_, {}, {}, {}}}; }
+  protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override {
+    protocol::Advance advance;
+    for (const auto& field : received) heard.insert(heard.end(), field.values.begin(), field.values.end());
+    for (const auto& name : sends_) {
+      std::vector<Eigen::Vector3d> values;
+      for (std::size_t p = 0; p < mesh_.points.size(); ++p) values.push_back(1e-3 * stubs::known_force(window.start, p) + 0.1 * received[0].values[p]);
+      advance.fields.push_back({surface_, name, std::move(values)});
+    }
+    return advance;
+  }
+  std::vector<Eigen::Vector3d> heard;
+
+ private:
+  std::string surface_;
+  std::vector<std::string> sends_;
+  geometry::SurfaceMesh mesh_ = stubs::square(24, false);
+};
+
+// 625 points are 15 KB a field: over ipc they go through shared memory, in one process as they are.
+TEST(TwoWay, LongFieldsThroughSharedMemoryArriveBitForBit) {
+  const auto heard = [](const std::string& endpoint) {
+    Plate first("spring", {"force"}), second("mass", {"displacement", "velocity"});
+    in_process::Door door;
+    const auto outcome = in_process::run(case_text(0.5, 10, serial), {{"first", &first}, {"second", &second}}, endpoint, door);
+    EXPECT_EQ(outcome.status, Status::met) << (outcome.error ? outcome.error->message : "");
+    first.heard.insert(first.heard.end(), second.heard.begin(), second.heard.end());
+    return first.heard;
+  };
+  const auto apart = heard(fmt::format("ipc:///tmp/acopla-two-way-{}", getpid())), together = heard("inproc://two-way-plates");
+  ASSERT_EQ(apart.size(), 20u * 3 * 625);
+  EXPECT_TRUE(apart == together);
 }
 
 }  // namespace
