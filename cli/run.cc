@@ -330,8 +330,12 @@ int Launch::report_lost() {
   outcome.windows = windows_;
   outcome.seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
   outcome.error = {lost_->participant, lost_->state, lost_->message};
-  io::write_whole(results_ + "/summary.json", coupler::summary_text(outcome));
   fmt::print(stderr, "{}\n", lost_->message);
+  try {
+    io::write_whole(results_ + "/summary.json", coupler::summary_text(outcome));
+  } catch (const io::UserError& error) {
+    fmt::print(stderr, "{}\n", error.what());
+  }
   if (lost_->exit_code == io::exit_failure) print_last_words("coupler");
   print_where_results_are(windows_, time_);
   return lost_->exit_code;

@@ -108,6 +108,15 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
     }
 }
 
+// A full disk ends a run and has no room for the summary either: what went wrong first is what is told.
+void write_summary(const std::string& results, Outcome& outcome) {
+  try {
+    io::write_whole(results + "/summary.json", summary_text(outcome));
+  } catch (const io::UserError& error) {
+    if (!outcome.error) note_error(outcome, Status::failed, io::exit_user_error, {"coupler", "writing the summary", error.what()});
+  }
+}
+
 }  // namespace
 
 Outcome Coupler::run() {
@@ -121,8 +130,7 @@ Outcome Coupler::run() {
     gather(case_, crew, stages, outcome);
   }  // the series are closed before the summary says that they are there
   outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (!options_.results.empty())
-    io::write_whole(options_.results + "/summary.json", summary_text(outcome));
+  if (!options_.results.empty()) write_summary(options_.results, outcome);
   reporter_.done(outcome);
   return outcome;
 }

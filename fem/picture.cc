@@ -10,6 +10,7 @@
 
 #include "fem/discretisation.h"
 #include "io/error.h"
+#include "io/results.h"
 
 namespace acopla::fem {
 namespace {
@@ -73,10 +74,15 @@ void write(std::ostream& file, const Mesh& mesh, const Vector& displacement,
 void write_picture(const std::string& path, const Mesh& mesh, const Vector& displacement,
                    const Vector& von_mises) {
   std::ofstream file(path, std::ios::binary);
-  if (file)
-    mesh.dimension() == 2 ? write<2>(file, mesh, displacement, von_mises)
-                          : write<3>(file, mesh, displacement, von_mises);
-  if (!file.flush()) throw io::UserError(path + ": cannot be written. Is the disk full?");
+  try {
+    if (file)
+      mesh.dimension() == 2 ? write<2>(file, mesh, displacement, von_mises)
+                            : write<3>(file, mesh, displacement, von_mises);
+  } catch (const std::exception&) {  // deal.II's, of a stream that went bad
+    if (file) throw;
+  }
+  file.close();
+  if (!file) io::give_up_writing(path, path);
 }
 
 }  // namespace acopla::fem

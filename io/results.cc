@@ -31,6 +31,12 @@ std::string make_results_folder(const std::string& case_file, const std::string&
                               fs::absolute("results").string()));
 }
 
+void give_up_writing(const std::string& path, const std::string& part) {
+  std::error_code error;
+  if (fs::is_regular_file(part, error)) fs::remove(part, error);  // and no device
+  throw UserError({path, 0, 0}, "the file cannot be written. Check the folder and the free space.");
+}
+
 void write_whole(const std::string& path, const std::string& text) {
   const auto part = path + ".part";
   std::ofstream stream(part, std::ios::binary);
@@ -38,7 +44,7 @@ void write_whole(const std::string& path, const std::string& text) {
   stream.close();
   std::error_code error;
   if (stream) fs::rename(part, path, error);
-  if (!stream || error) throw UserError({path, 0, 0}, "the file cannot be written. Check the folder and the free space.");
+  if (!stream || error) give_up_writing(path, part);
 }
 
 }  // namespace acopla::io

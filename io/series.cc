@@ -1,9 +1,12 @@
 #include "io/series.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -20,6 +23,26 @@ using geometry::Vec3;
 // The library prints a stack of errors by itself; ours are one sentence.
 void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
+// What HDF5 keeps of the tables of chunks grows with their number, to 32 MiB, unless it is told that the last ones are enough.
+Handle access_to_file() {
+  Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5AC_cache_config_t config{};
+  config.version = H5AC__CURR_CACHE_CONFIG_VERSION;
+  if (H5Pget_mdc_config(access.get(), &config) < 0) return access;
+  config.set_initial_size = true;
+  config.initial_size = config.min_size = config.max_size = 1 << 20;
+  H5Pset_mdc_config(access.get(), &config);
+  return access;
+}
+
+// Rows are only ever appended: one chunk at a time is enough, where HDF5 would keep a megabyte of each dataset.
+Handle access_to_appended() {
+  Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+  constexpr std::size_t slots = 7, bytes = 8 << 10;  // a chunk of small rows; larger ones pass it by
+  H5Pset_chunk_cache(access.get(), slots, bytes, 1.0);
+  return access;
+}
+
 // Paths inside the file are made of names from cases, which may hold dots but not slashes.
 struct Appendable {
   Handle data;
@@ -33,9 +56,39 @@ struct SeriesWriter::File {
   Handle file;
   std::map<std::string, Appendable> datasets;
   hsize_t windows = 0;
+  mutable bool abandoned = false;
+
+  ~File() {
+    datasets.clear();
+    hsize_t size = 0;
+    const bool known = H5Fflush(file.get(), H5F_SCOPE_LOCAL) >= 0 && H5Fget_filesize(file.get(), &size) >= 0;
+    // Gives back what was reserved and not used: HDF5 does not know of it.
+    if (file.finish() && known && !abandoned && ::truncate(path.c_str(), static_cast<off_t>(size)) != 0) return;
+  }
 
   [[noreturn]] void fail(const std::string& what) const {
+    abandon();
     throw UserError({path, 0, 0}, fmt::format("{} cannot be written. Check the free space of the results folder.", what));
+  }
+
+  // Leaves the file as the last flush left it: what HDF5 would still write when it is closed, half of which might find room, goes nowhere.
+  void abandon() const {
+    abandoned = true;
+    void* handle = nullptr;
+    const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+    if (nowhere >= 0 && file.valid() && H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &handle) >= 0 && handle)
+      ::dup2(nowhere, *static_cast<const int*>(handle));
+    if (nowhere >= 0) ::close(nowhere);
+  }
+
+  // Asks for all the room that a flush may need before it begins: one that ended in its middle would leave a file that nobody can read.
+  void reserve() const {
+    constexpr hsize_t spare = 64 << 10;  // for what HDF5 lays out only while it flushes
+    hsize_t size = 0;
+    void* handle = nullptr;
+    if (H5Fget_filesize(file.get(), &size) < 0 || H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &handle) < 0 || !handle) return;
+    if (::fallocate(*static_cast<const int*>(handle), 0, 0, static_cast<off_t>(size + spare)) == 0) return;
+    if (errno == ENOSPC || errno == EFBIG || errno == EDQUOT) fail("the file");  // other systems cannot be asked
   }
 
   Appendable& dataset(const std::string& name, const std::vector<hsize_t>& row) {
@@ -56,7 +109,8 @@ struct SeriesWriter::File {
     H5Pset_fill_value(create.get(), H5T_NATIVE_DOUBLE, &fill);
     const Handle link(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
     H5Pset_create_intermediate_group(link.get(), 1);
-    Handle data(H5Dcreate2(file.get(), name.c_str(), H5T_IEEE_F64LE, space.get(), link.get(), create.get(), H5P_DEFAULT),
+    Handle data(H5Dcreate2(file.get(), name.c_str(), H5T_IEEE_F64LE, space.get(), link.get(), create.get(),
+                           access_to_appended().get()),
                 H5Dclose);
     if (!data.valid()) fail(name);
     return datasets.emplace(name, Appendable{std::move(data), size}).first->second;
@@ -84,7 +138,7 @@ struct SeriesWriter::File {
     };
     if (H5Ovisit2(file.get(), H5_INDEX_NAME, H5_ITER_INC, collect, &names, H5O_INFO_BASIC) < 0) fail("the file");
     for (const auto& name : names) {
-      Handle data(H5Dopen2(file.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+      Handle data(H5Dopen2(file.get(), name.c_str(), access_to_appended().get()), H5Dclose);
       const Handle space(H5Dget_space(data.get()), H5Sclose);
       const auto rank = static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space.get())));
       std::vector<hsize_t> size(rank), limit(rank);
@@ -116,14 +170,14 @@ struct SeriesWriter::File {
 SeriesWriter::SeriesWriter(const std::string& path) : file_(std::make_unique<File>()) {
   silence();
   file_->path = path;
-  file_->file = Handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+  file_->file = Handle(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access_to_file().get()), H5Fclose);
   if (!file_->file.valid()) file_->fail("the file");
 }
 
 SeriesWriter::SeriesWriter(const std::string& path, std::size_t windows) : file_(std::make_unique<File>()) {
   silence();
   file_->path = path;
-  file_->file = Handle(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
+  file_->file = Handle(H5Fopen(path.c_str(), H5F_ACC_RDWR, access_to_file().get()), H5Fclose);
   if (!file_->file.valid())
     throw UserError({path, 0, 0}, "the record cannot be opened to go on with it: it is missing, damaged, or another program has it open. Start the run from its beginning.");
   file_->cut(windows);
@@ -165,6 +219,7 @@ void SeriesWriter::add_field(const std::string& surface, const std::string& fiel
 void SeriesWriter::add_scalar(const std::string& name, double value) { file_->append("/" + name, {}, &value); }
 
 void SeriesWriter::flush() {
+  file_->reserve();
   if (H5Fflush(file_->file.get(), H5F_SCOPE_LOCAL) < 0) file_->fail("the file");
 }
 

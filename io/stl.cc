@@ -12,6 +12,7 @@
 #include <unordered_map>
 
 #include "io/error.h"
+#include "io/results.h"
 
 namespace acopla::io {
 namespace {
@@ -200,7 +201,7 @@ void write_stl(const std::string& path, const TriangleMesh& mesh) {
     stream.write("\0\0", 2);
   }
   stream.close();
-  if (!stream) throw UserError({path, 0, 0}, "the STL file cannot be written. Check the folder and the free space.");
+  if (!stream) give_up_writing(path, path);
 }
 
 }  // namespace acopla::io

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "io/error.h"
+#include "io/results.h"
 
 namespace acopla::io {
 namespace {
@@ -50,7 +51,7 @@ void write_file(const std::string& path, const std::string& text) {
   std::ofstream stream(path, std::ios::binary);
   stream << text;
   stream.close();
-  if (!stream) throw UserError({path, 0, 0}, "the file cannot be written. Check the folder and the free space.");
+  if (!stream) give_up_writing(path, path);
 }
 
 void write_poly_data(const std::string& path, std::span<const Eigen::Vector3d> points,

@@ -1,11 +1,12 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Ends the processes of a run in every way there is, and looks at what the launcher says and leaves behind.
 
-Usage: kill_test.py FOLDER_OF_EXECUTABLES [test names]. Only the standard library is needed.
+Usage: kill_test.py FOLDER_OF_EXECUTABLES [test names].
 """
 
 import json
 import os
+import resource
 import shutil
 import signal
 import socket
@@ -14,6 +15,9 @@ import sys
 import tempfile
 import time
 import unittest
+
+import h5py
+import numpy
 
 BIN = os.path.abspath(sys.argv[1])
 # Bounds are on top of what the design promises, for machines that are busy with other things.
@@ -60,7 +64,7 @@ def processes_with(text):
 class Run:
     """A run of `acopla run` on two stubs in a folder of its own."""
 
-    def __init__(self, pause=20, end=100.0, start_limit=60, send="", receive="", grains="", structure="", results=None):
+    def __init__(self, pause=20, end=100.0, start_limit=60, send="", receive="", grains="", structure="", results=None, preexec=None):
         self.folder = tempfile.mkdtemp(prefix="kill-test-")
         quoted = lambda words: ", ".join(f'"{w}"' for w in ["--pause", str(pause)] + words.split())
         with open(f"{self.folder}/case.toml", "w") as stream:
@@ -70,7 +74,7 @@ class Run:
         self.begin = time.monotonic()
         self.process = subprocess.Popen(
             [f"{BIN}/acopla", "run", f"{self.folder}/case.toml", "--results", self.results], cwd=self.folder,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=preexec)
 
     def pid(self, who):
         """Waits until the process is there. who: coupler, send, receive or launcher."""
@@ -134,11 +138,11 @@ class KillTest(unittest.TestCase):
         self.assertEqual([n for n in os.listdir("/tmp") if n.startswith(f"acopla-{pid}-")], [], "the socket's folder is left")
 
     def assert_readable(self, run):
-        tool = shutil.which("h5ls")
-        if tool and os.path.exists(f"{run.results}/interface.h5"):
-            listing = subprocess.run([tool, "-r", f"{run.results}/interface.h5"], capture_output=True, text=True)
-            self.assertEqual(listing.returncode, 0, listing.stderr)
-            self.assertIn("grains.box", listing.stdout)
+        if os.path.exists(f"{run.results}/interface.h5"):
+            with h5py.File(f"{run.results}/interface.h5") as record:
+                self.assertIn("grains.box", record)
+                self.assertEqual(record["grains.box/force"].shape[0], record["windows"].shape[0])
+                self.assertTrue(numpy.isfinite(record["grains.box/force"][...]).all())
 
     def assert_failed(self, run, code, participant, words, seconds, status="failed", reached=True):
         self.assertEqual(run.end(), code, run.err)
@@ -310,6 +314,14 @@ class KillTest(unittest.TestCase):
         self.assert_nothing_left(run)
 
     # --- results and addresses ---
+
+    def test_full_disk(self):
+        # Files of 200 KB at most stand for it: writing beyond fails in every process. Pages of the log are not files.
+        def little_room():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+        run = self.start(pause=1, preexec=little_room)
+        self.assert_failed(run, 2, "coupler", "interface.h5: the file cannot be written. Check the free space of the results folder.", 20)
 
     def test_existing_results_are_refused(self):
         folder = tempfile.mkdtemp(prefix="kill-test-results-")

@@ -1,7 +1,9 @@
 // Series: what is written is read back bit for bit, also after a writer that never closed its file.
+#include <sys/resource.h>
 #include <sys/wait.h>
 
 #include <cmath>
+#include <csignal>
 
 #include "io/series.h"
 #include "tests/unit/io/scratch.h"
@@ -81,6 +83,42 @@ TEST_F(Series, AWriterThatIsKilledLeavesAllFlushedWindows) {
   }
   waitpid(child, nullptr, 0);
   expect_windows(file, 5);
+}
+
+// Whatever window the disk is full at, and wherever in it.
+TEST_F(Series, AFullDiskLeavesAllFlushedWindows) {
+  for (rlim_t room = 100'000; room < 240'000; room += 9'731) {
+    const auto file = path("full" + std::to_string(room) + ".h5");
+    const pid_t child = fork();
+    if (child == 0) {
+      signal(SIGXFSZ, SIG_IGN);  // writing beyond the limit fails, as on a full disk
+      const rlimit low{room, room};
+      setrlimit(RLIMIT_FSIZE, &low);
+      int flushed = 0;
+      try {
+        SeriesWriter writer(file);
+        writer.add_surface("grains.box", surface());
+        writer.flush();
+        for (int k = 0;; ++k) {
+          writer.begin_window(0.1 * k, 0.1 * (k + 1));
+          writer.add_field("grains.box", "force", force(k));
+          writer.add_scalar("ledger/force_loss", 1e-16 * k);
+          for (int table = 0; k >= 2 && table < 5; ++table) writer.add_scalar("quantities/" + std::to_string(table * k), k);
+          writer.flush();
+          flushed = k + 1;
+        }
+      } catch (const UserError& error) {
+        _exit(std::string(error.what()).find("cannot be written") != std::string::npos ? std::min(flushed, 254) : 255);
+      }
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status)) << room;
+    ASSERT_NE(WEXITSTATUS(status), 255) << room;
+    const SeriesReader reader(file);
+    ASSERT_EQ(reader.windows(), static_cast<std::size_t>(WEXITSTATUS(status))) << room;
+    for (int k = 0; k < WEXITSTATUS(status); ++k) EXPECT_EQ(reader.field("grains.box", "force", static_cast<std::size_t>(k)), force(k)) << room;
+  }
 }
 
 TEST_F(Series, EmptySurfacesAreFine) {
