@@ -79,7 +79,7 @@ std::optional<std::uint32_t> PartnerSearch::nearest_middle(const Vec3& x, double
   return nearest;
 }
 
-std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance) const {
+std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance, std::optional<std::uint32_t> guess) const {
   if (boxes_.empty() || !x.allFinite()) return {};
   Partner partner;
   Examined known;
@@ -89,6 +89,11 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
     const auto projection = project(face, x);
     ++partner.examined;
     known.put(face, projection.distance);
+    if (projection.distance < least) {
+      least = projection.distance;
+      partner.face = face;
+      partner.projection = projection;
+    }
     return projection.distance;
   };
   const auto for_each_within = [&](double reach, auto&& visit) {
@@ -102,19 +107,14 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
   const auto near_enough = [&](std::uint32_t face) {
     return distance_to(boxes_[face], x) <= std::min(least, max_distance) + tie_;
   };
-  const auto examine = [&](std::uint32_t face) {
-    const double distance = distance_of(face);
-    if (distance >= least) return;
-    least = distance;
-    partner.face = face;
-  };
   double half = std::max(0.03 * grid_.smallest_size(), distance_to(grid_.bounds(), x));
+  if (guess && distance_of(*guess) <= grid_.size()) half = std::max(half, least);  // a bad guess must not open a wide box
   while (true) {
     const double reach = std::min(half, max_distance);
     if (!std::isfinite(least))
-      if (const auto seed = nearest_middle(x, reach)) examine(*seed);
+      if (const auto seed = nearest_middle(x, reach)) distance_of(*seed);
     for_each_within(reach, [&](std::uint32_t face) {
-      if (near_enough(face)) examine(face);
+      if (near_enough(face)) distance_of(face);
     });
     if (least <= reach || !(reach < max_distance)) break;
     half = std::min(least, 4 * half);
@@ -122,12 +122,15 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
   if (!(least <= max_distance)) return {};
 
   // The lowest index among all that lie as near.
-  for_each_within(least + tie_, [&](std::uint32_t face) {
-    if (face < partner.face && distance_to(boxes_[face], x) <= least + 2 * tie_ &&
-        distance_of(face) <= least + tie_)
-      partner.face = face;
+  const double nearest = least;
+  auto lowest = partner.face;
+  for_each_within(nearest + tie_, [&](std::uint32_t face) {
+    if (face < lowest && distance_to(boxes_[face], x) <= nearest + 2 * tie_ && distance_of(face) <= nearest + tie_) lowest = face;
   });
-  partner.projection = project(partner.face, x);
+  if (lowest != partner.face) {
+    partner.face = lowest;
+    partner.projection = project(lowest, x);
+  }
   return partner;
 }
 
