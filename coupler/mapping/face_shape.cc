@@ -325,6 +325,13 @@ Minimum newton_from(FaceKind kind, std::span<const Vec3> nodes, const Vec3& x, c
   return {p, model.value, limit, false};
 }
 
+/// To round-off; its two triangles then are the face itself, parameters and all.
+bool is_parallelogram(std::span<const Vec3> nodes) {
+  constexpr double round_off = 1e-14;
+  const Vec3 u = nodes[1] - nodes[0], v = nodes[3] - nodes[0];
+  return (nodes[2] - nodes[0] - u - v).squaredNorm() <= round_off * round_off * (u.squaredNorm() + v.squaredNorm());
+}
+
 FaceProjection finish(FaceKind kind, std::span<const Vec3> nodes, const Vec3& x,
                       const FaceValues& weights, const Vec2& parameters) {
   FaceProjection result;
@@ -408,10 +415,12 @@ FaceProjection project_on_face(FaceKind kind, std::span<const Vec3> nodes, const
     const auto w = nearest_weights(x, nodes[0], nodes[1], nodes[2]);
     return finish(kind, nodes, x, {w[0], w[1], w[2]}, {w[1], w[2]});
   }
-  auto best = newton_from(kind, nodes, x, start_of(kind, nodes, x));
+  const Vec2 start = start_of(kind, nodes, x);
+  if (kind == FaceKind::quad4 && is_parallelogram(nodes)) return finish(kind, nodes, x, shape_functions(kind, start), start);
+  auto best = newton_from(kind, nodes, x, start);
   if (!best.converged) {  // a badly folded face: try every node of it and keep what lies nearest
-    for (const auto& start : node_parameters(kind)) {
-      const auto other = newton_from(kind, nodes, x, start);
+    for (const auto& node : node_parameters(kind)) {
+      const auto other = newton_from(kind, nodes, x, node);
       if (other.value < best.value) best = other;
     }
   }

@@ -178,6 +178,8 @@ class Integration {
     for (std::size_t k = 0; k < parts_.size(); ++k) sorted[next[parts_[k].point]++] = k;
     Overlap result;
     result.starts.reserve(points + 1);
+    result.nodes.reserve(part_values_.size());
+    result.weights.reserve(part_values_.size());
     std::vector<std::size_t> places(to_.points.size(), 0);  // of the nodes in the result, where they have one in the present row
     for (std::uint32_t point = 0; point < points; ++point) {
       const auto start = result.starts.back();
@@ -352,12 +354,13 @@ class Integration {
     if (polygon.size() < 3) return;
     const auto middle = centroid(polygon, no_more_than_an_edge * whole);
     if (!middle) return;
-    const auto place = [&](const Vec2& p) { return Vec2(cross(p - origin, across) / turn, cross(along, p - origin) / turn); };
+    const double per_turn = 1 / turn, per_whole = 1 / whole;
+    const auto place = [&](const Vec2& p) { return Vec2(per_turn * cross(p - origin, across), per_turn * cross(along, p - origin)); };
     const Vec2 share = place(*middle);
     if ((points_[0] + share[0] * u + share[1] * v - frame.at(*middle)).norm() > farthest) return;
     begin(face);
     const auto take = [&](const Vec2& p, double weight) {
-      const double first = cross(corners[1] - p, corners[2] - p) / whole, second = cross(corners[2] - p, corners[0] - p) / whole;
+      const double first = per_whole * cross(corners[1] - p, corners[2] - p), second = per_whole * cross(corners[2] - p, corners[0] - p);
       const Vec2 at = place(p);
       gather({first, second, 1 - first - second}, 3, shape_functions(kind, count == 4 ? Vec2(2 * at[0] - 1, 2 * at[1] - 1) : at), weight);
     };

@@ -42,6 +42,13 @@ class Examined {
       if (faces_[k] == face) return &distances_[k];
     return nullptr;
   }
+  bool forgot() const { return count_ > faces_.size(); }
+  /// The lowest face within a distance, of those held.
+  std::uint32_t lowest_within(double distance, std::uint32_t lowest) const {
+    for (std::size_t k = 0; k < std::min(count_, faces_.size()); ++k)
+      if (distances_[k] <= distance) lowest = std::min(lowest, faces_[k]);
+    return lowest;
+  }
   void put(std::uint32_t face, double distance) {
     const std::size_t place = count_++ % faces_.size();
     faces_[place] = face;
@@ -97,7 +104,7 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
     return projection.distance;
   };
   const auto for_each_within = [&](double reach, auto&& visit) {
-    const Vec3 half = Vec3::Constant(reach + tie_);
+    const Vec3 half = Vec3::Constant(reach + 2 * tie_);
     grid_.for_each_near(x - half, x + half, visit);
   };
 
@@ -105,7 +112,7 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
   // It starts far below a bucket: most points lie almost on the surface, and one bucket then offers
   // a bound at once.
   const auto near_enough = [&](std::uint32_t face) {
-    return distance_to(boxes_[face], x) <= std::min(least, max_distance) + tie_;
+    return distance_to(boxes_[face], x) <= std::min(least, max_distance) + 2 * tie_;
   };
   double half = std::max(0.03 * grid_.smallest_size(), distance_to(grid_.bounds(), x));
   if (guess && distance_of(*guess) <= grid_.size()) half = std::max(half, least);  // a bad guess must not open a wide box
@@ -121,12 +128,13 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
   }
   if (!(least <= max_distance)) return {};
 
-  // The lowest index among all that lie as near.
-  const double nearest = least;
-  auto lowest = partner.face;
-  for_each_within(nearest + tie_, [&](std::uint32_t face) {
-    if (face < lowest && distance_to(boxes_[face], x) <= nearest + 2 * tie_ && distance_of(face) <= nearest + tie_) lowest = face;
-  });
+  // The lowest index among all that lie as near, which have all been examined.
+  const double as_near = least + tie_;
+  auto lowest = known.lowest_within(as_near, partner.face);
+  if (known.forgot())
+    for_each_within(as_near, [&](std::uint32_t face) {
+      if (face < lowest && distance_to(boxes_[face], x) <= as_near + tie_ && distance_of(face) <= as_near) lowest = face;
+    });
   if (lowest != partner.face) {
     partner.face = lowest;
     partner.projection = project(lowest, x);
