@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "geometry/triangle.h"
 
@@ -13,6 +14,13 @@ namespace acopla::coupler {
 namespace {
 
 using Triple = std::array<std::uint8_t, 3>;
+
+/// A basis without derivatives, for where nobody asks for them.
+struct Values {
+  FaceValues value{};
+};
+template <class Basis>
+constexpr bool derivatives = std::is_same_v<Basis, FaceBasis>;
 
 /// The three quadratic polynomials of a line with nodes at −1, 1 and 0, and their derivatives.
 struct Quadratic {
@@ -27,64 +35,105 @@ struct Quadratic {
 constexpr std::array<std::array<std::size_t, 2>, 9> tensor_index{
     {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {2, 0}, {1, 2}, {2, 1}, {0, 2}, {2, 2}}};
 
-void line2_basis(double xi, FaceBasis& basis) {
+template <class Basis>
+void line2_basis(double xi, Basis& basis) {
   basis.value = {0.5 * (1 - xi), 0.5 * (1 + xi)};
-  basis.u = {-0.5, 0.5};
+  if constexpr (derivatives<Basis>) basis.u = {-0.5, 0.5};
 }
 
-void line3_basis(double xi, FaceBasis& basis) {
+template <class Basis>
+void line3_basis(double xi, Basis& basis) {
   const Quadratic line(xi);
   std::copy(line.value.begin(), line.value.end(), basis.value.begin());
-  std::copy(line.first.begin(), line.first.end(), basis.u.begin());
-  std::copy(line.second.begin(), line.second.end(), basis.uu.begin());
+  if constexpr (derivatives<Basis>) {
+    std::copy(line.first.begin(), line.first.end(), basis.u.begin());
+    std::copy(line.second.begin(), line.second.end(), basis.uu.begin());
+  }
 }
 
-void triangle3_basis(double xi, double eta, FaceBasis& basis) {
+template <class Basis>
+void triangle3_basis(double xi, double eta, Basis& basis) {
   basis.value = {1 - xi - eta, xi, eta};
-  basis.u = {-1, 1, 0};
-  basis.v = {-1, 0, 1};
+  if constexpr (derivatives<Basis>) {
+    basis.u = {-1, 1, 0};
+    basis.v = {-1, 0, 1};
+  }
 }
 
-void triangle6_basis(double xi, double eta, FaceBasis& basis) {
+template <class Basis>
+void triangle6_basis(double xi, double eta, Basis& basis) {
   const std::array<double, 3> area{1 - xi - eta, xi, eta};
   constexpr std::array<double, 3> u{-1, 1, 0}, v{-1, 0, 1};
   for (std::size_t i = 0; i < 3; ++i) {
-    basis.value[i] = area[i] * (2 * area[i] - 1);
-    basis.u[i] = u[i] * (4 * area[i] - 1);
-    basis.v[i] = v[i] * (4 * area[i] - 1);
-    basis.uu[i] = 4 * u[i] * u[i];
-    basis.uv[i] = 4 * u[i] * v[i];
-    basis.vv[i] = 4 * v[i] * v[i];
     const std::size_t j = (i + 1) % 3;
+    basis.value[i] = area[i] * (2 * area[i] - 1);
     basis.value[3 + i] = 4 * area[i] * area[j];
-    basis.u[3 + i] = 4 * (u[i] * area[j] + area[i] * u[j]);
-    basis.v[3 + i] = 4 * (v[i] * area[j] + area[i] * v[j]);
-    basis.uu[3 + i] = 8 * u[i] * u[j];
-    basis.uv[3 + i] = 4 * (u[i] * v[j] + v[i] * u[j]);
-    basis.vv[3 + i] = 8 * v[i] * v[j];
+    if constexpr (derivatives<Basis>) {
+      basis.u[i] = u[i] * (4 * area[i] - 1);
+      basis.v[i] = v[i] * (4 * area[i] - 1);
+      basis.uu[i] = 4 * u[i] * u[i];
+      basis.uv[i] = 4 * u[i] * v[i];
+      basis.vv[i] = 4 * v[i] * v[i];
+      basis.u[3 + i] = 4 * (u[i] * area[j] + area[i] * u[j]);
+      basis.v[3 + i] = 4 * (v[i] * area[j] + area[i] * v[j]);
+      basis.uu[3 + i] = 8 * u[i] * u[j];
+      basis.uv[3 + i] = 4 * (u[i] * v[j] + v[i] * u[j]);
+      basis.vv[3 + i] = 8 * v[i] * v[j];
+    }
   }
 }
 
-void quad4_basis(double xi, double eta, FaceBasis& basis) {
+template <class Basis>
+void quad4_basis(double xi, double eta, Basis& basis) {
   constexpr std::array<double, 4> a{-1, 1, 1, -1}, b{-1, -1, 1, 1};
   for (std::size_t k = 0; k < 4; ++k) {
     basis.value[k] = 0.25 * (1 + a[k] * xi) * (1 + b[k] * eta);
-    basis.u[k] = 0.25 * a[k] * (1 + b[k] * eta);
-    basis.v[k] = 0.25 * (1 + a[k] * xi) * b[k];
-    basis.uv[k] = 0.25 * a[k] * b[k];
+    if constexpr (derivatives<Basis>) {
+      basis.u[k] = 0.25 * a[k] * (1 + b[k] * eta);
+      basis.v[k] = 0.25 * (1 + a[k] * xi) * b[k];
+      basis.uv[k] = 0.25 * a[k] * b[k];
+    }
   }
 }
 
-void quad9_basis(double xi, double eta, FaceBasis& basis) {
+template <class Basis>
+void quad9_basis(double xi, double eta, Basis& basis) {
   const Quadratic p(xi), q(eta);
   for (std::size_t k = 0; k < 9; ++k) {
     const auto [i, j] = tensor_index[k];
     basis.value[k] = p.value[i] * q.value[j];
-    basis.u[k] = p.first[i] * q.value[j];
-    basis.v[k] = p.value[i] * q.first[j];
-    basis.uu[k] = p.second[i] * q.value[j];
-    basis.uv[k] = p.first[i] * q.first[j];
-    basis.vv[k] = p.value[i] * q.second[j];
+    if constexpr (derivatives<Basis>) {
+      basis.u[k] = p.first[i] * q.value[j];
+      basis.v[k] = p.value[i] * q.first[j];
+      basis.uu[k] = p.second[i] * q.value[j];
+      basis.uv[k] = p.first[i] * q.first[j];
+      basis.vv[k] = p.value[i] * q.second[j];
+    }
+  }
+}
+
+template <class Basis>
+void fill(FaceKind kind, const Vec2& parameters, Basis& basis) {
+  const double xi = parameters[0], eta = parameters[1];
+  switch (kind) {
+    case FaceKind::line2:
+      line2_basis(xi, basis);
+      break;
+    case FaceKind::line3:
+      line3_basis(xi, basis);
+      break;
+    case FaceKind::triangle3:
+      triangle3_basis(xi, eta, basis);
+      break;
+    case FaceKind::triangle6:
+      triangle6_basis(xi, eta, basis);
+      break;
+    case FaceKind::quad4:
+      quad4_basis(xi, eta, basis);
+      break;
+    case FaceKind::quad9:
+      quad9_basis(xi, eta, basis);
+      break;
   }
 }
 
@@ -276,6 +325,13 @@ Minimum newton_from(FaceKind kind, std::span<const Vec3> nodes, const Vec3& x, c
   return {p, model.value, limit, false};
 }
 
+/// To round-off; its two triangles then are the face itself, parameters and all.
+bool is_parallelogram(std::span<const Vec3> nodes) {
+  constexpr double round_off = 1e-14;
+  const Vec3 u = nodes[1] - nodes[0], v = nodes[3] - nodes[0];
+  return (nodes[2] - nodes[0] - u - v).squaredNorm() <= round_off * round_off * (u.squaredNorm() + v.squaredNorm());
+}
+
 FaceProjection finish(FaceKind kind, std::span<const Vec3> nodes, const Vec3& x,
                       const FaceValues& weights, const Vec2& parameters) {
   FaceProjection result;
@@ -291,32 +347,14 @@ FaceProjection finish(FaceKind kind, std::span<const Vec3> nodes, const Vec3& x,
 
 FaceBasis shape_basis(FaceKind kind, const Vec2& parameters) {
   FaceBasis basis;
-  const double xi = parameters[0], eta = parameters[1];
-  switch (kind) {
-    case FaceKind::line2:
-      line2_basis(xi, basis);
-      break;
-    case FaceKind::line3:
-      line3_basis(xi, basis);
-      break;
-    case FaceKind::triangle3:
-      triangle3_basis(xi, eta, basis);
-      break;
-    case FaceKind::triangle6:
-      triangle6_basis(xi, eta, basis);
-      break;
-    case FaceKind::quad4:
-      quad4_basis(xi, eta, basis);
-      break;
-    case FaceKind::quad9:
-      quad9_basis(xi, eta, basis);
-      break;
-  }
+  fill(kind, parameters, basis);
   return basis;
 }
 
 FaceValues shape_functions(FaceKind kind, const Vec2& parameters) {
-  return shape_basis(kind, parameters).value;
+  Values basis;
+  fill(kind, parameters, basis);
+  return basis.value;
 }
 
 std::span<const Vec2> node_parameters(FaceKind kind) {
@@ -377,10 +415,12 @@ FaceProjection project_on_face(FaceKind kind, std::span<const Vec3> nodes, const
     const auto w = nearest_weights(x, nodes[0], nodes[1], nodes[2]);
     return finish(kind, nodes, x, {w[0], w[1], w[2]}, {w[1], w[2]});
   }
-  auto best = newton_from(kind, nodes, x, start_of(kind, nodes, x));
+  const Vec2 start = start_of(kind, nodes, x);
+  if (kind == FaceKind::quad4 && is_parallelogram(nodes)) return finish(kind, nodes, x, shape_functions(kind, start), start);
+  auto best = newton_from(kind, nodes, x, start);
   if (!best.converged) {  // a badly folded face: try every node of it and keep what lies nearest
-    for (const auto& start : node_parameters(kind)) {
-      const auto other = newton_from(kind, nodes, x, start);
+    for (const auto& node : node_parameters(kind)) {
+      const auto other = newton_from(kind, nodes, x, node);
       if (other.value < best.value) best = other;
     }
   }

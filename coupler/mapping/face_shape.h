@@ -50,7 +50,7 @@ struct FaceProjection {
       true;  ///< false: the best point found, on the face but perhaps not the nearest of it
 };
 
-/// The point of a face nearest to `x`. line2 and triangle3 are exact. The others are minimised by
+/// The point of a face nearest to `x`. line2, triangle3 and parallelograms are exact. The others are minimised by
 /// Newton's method on ½|x − X(ξ, η)|², each step solving its quadratic model exactly inside the
 /// parameter domain (which is what an active set would find), with Gauss–Newton and growing damping
 /// where the model is not convex or the distance does not decrease. The start is the nearest point

@@ -111,12 +111,14 @@ class Mapping::Builder {
 
   void by_projection(const std::vector<bool>& taking, double max_distance) {
     const PartnerSearch search(to_);
+    reserve(4 * from_.points.size());
     for_each_point(taking, [&](std::uint32_t point, const Vec3& x) { return project(point, x, search, max_distance); });
   }
 
   void by_overlap(const std::vector<bool>& taking, double max_distance) {
     const PartnerSearch search(to_);
     const auto overlap = overlap_of(from_, to_, search, max_distance);
+    reserve(overlap.nodes.size());
     for_each_point(taking, [&](std::uint32_t point, const Vec3& x) {
       const auto start = overlap.starts[point], size = overlap.starts[point + 1] - start;
       if (size == 0) {
@@ -153,6 +155,16 @@ class Mapping::Builder {
   }
 
  private:
+  /// For so many shares of nodes, each of which may carry a couple too.
+  void reserve(std::size_t count) {
+    mapping_.nodes_.reserve(count);
+    mapping_.weights_.reserve(count);
+    mapping_.couples_.reserve(from_.points.size());
+    mapping_.couple_starts_.reserve(from_.points.size() + 1);
+    mapping_.couple_nodes_.reserve(count);
+    mapping_.arms_.reserve(count);
+  }
+
   template <class Place>
   void for_each_point(const std::vector<bool>& taking, const Place& place) {
     mapping_.starts_.reserve(from_.points.size() + 1);

@@ -12,6 +12,8 @@ namespace acopla::coupler {
 namespace {
 
 using geometry::SurfaceMesh;
+using FaceVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_face_nodes, 1>;
+using FaceMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_face_nodes, max_face_nodes>;
 
 constexpr double least_cosine = 0.5;   // of the angle between two faces that may cover each other
 constexpr double nearly_as_far = 0.25; // of a face's size: farther than the nearest face by this, another face is another side
@@ -67,25 +69,48 @@ struct Frame {
   Vec3 at(const Vec2& p) const { return origin + p[0] * s + p[1] * t; }
 };
 
-using Polygon = std::vector<Vec2>;
-
 double cross(const Vec2& a, const Vec2& b) { return a[0] * b[1] - a[1] * b[0]; }
 
-/// What of a polygon lies left of the line from a to b (Sutherland & Hodgman 1974).
-void clip(Polygon& polygon, Polygon& storage, const Vec2& a, const Vec2& b) {
-  storage.clear();
-  const auto side = [&](const Vec2& p) {
-    const double value = cross(b - a, p - a);
-    return std::abs(value) > on_the_line * (b - a).squaredNorm() ? value : 0;  // else round-off would cut an edge that lies along the line anywhere
-  };
-  for (std::size_t k = 0; k < polygon.size(); ++k) {
-    const Vec2 &p = polygon[k], &q = polygon[(k + 1) % polygon.size()];
-    const double at_p = side(p), at_q = side(q);
-    if (at_p >= 0) storage.push_back(p);
-    if ((at_p > 0 && at_q < 0) || (at_p < 0 && at_q > 0)) storage.push_back(p + at_p / (at_p - at_q) * (q - p));
+/// What three cuts leave of a face of four corners at most: each doubles the corners at worst, though it adds one where round-off leaves them convex.
+class Polygon {
+ public:
+  std::size_t size() const { return size_; }
+  const Vec2& operator[](std::size_t k) const { return corners_[k]; }
+  void push_back(const Vec2& p) { corners_[size_++] = p; }
+  void reverse() { std::reverse(corners_.begin(), corners_.begin() + static_cast<std::ptrdiff_t>(size_)); }
+
+  /// Keeps what lies left of the line from a to b (Sutherland & Hodgman 1974).
+  void clip(const Vec2& a, const Vec2& b) {
+    const Vec2 along = b - a;
+    const double least = on_the_line * along.squaredNorm();  // below it round-off would cut an edge that lies along the line anywhere
+    std::array<double, room> side;
+    bool cut = false;
+    for (std::size_t k = 0; k < size_; ++k) {
+      const double value = cross(along, corners_[k] - a);
+      side[k] = std::abs(value) > least ? value : 0;
+      cut = cut || side[k] < 0;
+    }
+    if (!cut) return;
+    Polygon left;
+    for (std::size_t k = 0; k < size_; ++k) {
+      const std::size_t next = k + 1 < size_ ? k + 1 : 0;
+      const double at_p = side[k], at_q = side[next];
+      if (at_p >= 0) left.push_back(corners_[k]);
+      if ((at_p > 0 && at_q < 0) || (at_p < 0 && at_q > 0)) left.push_back(corners_[k] + at_p / (at_p - at_q) * (corners_[next] - corners_[k]));
+    }
+    size_ = left.size_;
+    std::copy_n(left.corners_.begin(), size_, corners_.begin());
   }
-  std::swap(polygon, storage);
-}
+  /// The same for the inside of a triangle that turns counter-clockwise.
+  void clip(const std::array<Vec2, 3>& triangle) {
+    for (std::size_t k = 0; k < 3 && size_ > 2; ++k) clip(triangle[k], triangle[(k + 1) % 3]);
+  }
+
+ private:
+  static constexpr std::size_t room = 32;
+  std::array<Vec2, room> corners_;
+  std::size_t size_ = 0;
+};
 
 /// Of a convex polygon; none of one with less than this area, which is round-off beside an edge.
 std::optional<Vec2> centroid(const Polygon& polygon, double least) {
@@ -114,12 +139,8 @@ const std::array<QuadraturePoint, 7> seven_points = [] {
                                          {{1 - 2 * a, a, a}, wa}, {{a, 1 - 2 * a, a}, wa}, {{a, a, 1 - 2 * a}, wa},
                                          {{1 - 2 * b, b, b}, wb}, {{b, 1 - 2 * b, b}, wb}, {{b, b, 1 - 2 * b}, wb}}};
 }();
-// Exact for degree 4 (Dunavant 1985): hat function times bilinear shape function, and one to spare.
-constexpr std::array<QuadraturePoint, 6> six_points = [] {
-  constexpr double a = 0.445948490915965, b = 0.091576213509771, wa = 0.223381589678011, wb = 0.109951743655322;
-  return std::array<QuadraturePoint, 6>{{{{1 - 2 * a, a, a}, wa}, {{a, 1 - 2 * a, a}, wa}, {{a, a, 1 - 2 * a}, wa},
-                                         {{1 - 2 * b, b, b}, wb}, {{b, 1 - 2 * b, b}, wb}, {{b, b, 1 - 2 * b}, wb}}};
-}();
+// Exact for degree 3 (Strang & Fix 1973): hat function times bilinear or quadratic shape function of an affine face.
+constexpr std::array<QuadraturePoint, 4> four_points{{{{1. / 3, 1. / 3, 1. / 3}, -27. / 48}, {{.6, .2, .2}, 25. / 48}, {{.2, .6, .2}, 25. / 48}, {{.2, .2, .6}, 25. / 48}}};
 // Gauss's three points on [0, 1], exact for degree 5.
 const std::array<std::array<double, 2>, 3> line_points = [] {
   const double h = 0.5 * std::sqrt(0.6);
@@ -130,54 +151,69 @@ const std::array<std::array<double, 2>, 3> line_points = [] {
 class Integration {
  public:
   Integration(const SurfaceMesh& from, const SurfaceMesh& to, const PartnerSearch& search, double max_distance)
-      : from_(from), to_(to), search_(search), max_distance_(max_distance), whole_(from.points.size(), 0.0) {}
+      : from_(from), to_(to), search_(search), max_distance_(max_distance), whole_(from.points.size(), 0.0) {
+    parts_.reserve(from.connectivity().size());
+    part_values_.reserve(12 * from.connectivity().size());  // nodes under a face of about the same size; what is never written costs nothing
+    affine_.reserve(to.face_count());
+    for (std::size_t face = 0; face < to.face_count(); ++face) affine_.push_back(is_affine(to, face));
+  }
 
   Overlap rows() {
     for (std::size_t face = 0; face < from_.face_count(); ++face) {
-      hats_.setZero(std::ssize(from_.nodes(face)), std::ssize(from_.nodes(face)));
+      const auto size = std::ssize(from_.nodes(face));
+      hats_.setZero(size, size);
       from_kind_ = from_.kind(face);
       under_.clear();
       shares_.clear();
       for_each_piece(from_, face, [&](const Piece& piece) { add(piece); });
       enter(from_.nodes(face));
     }
-    // By point, and of a point by node. One face after another has added to a pair; the sum goes in that order.
+    // By point; a node's value is what one face after another gives it.
     const auto points = from_.points.size();
     std::vector<std::size_t> starts(points + 1, 0);
-    for (const auto& entry : entries_) ++starts[entry.point + 1];
+    for (const auto& part : parts_) ++starts[part.point + 1];
     for (std::size_t k = 1; k < starts.size(); ++k) starts[k] += starts[k - 1];
-    std::vector<std::pair<std::uint32_t, double>> sorted(entries_.size());
+    std::vector<std::size_t> sorted(parts_.size());
     auto next = starts;
-    for (const auto& entry : entries_) sorted[next[entry.point]++] = {entry.node, entry.value};
+    for (std::size_t k = 0; k < parts_.size(); ++k) sorted[next[parts_[k].point]++] = k;
     Overlap result;
     result.starts.reserve(points + 1);
+    result.nodes.reserve(part_values_.size());
+    result.weights.reserve(part_values_.size());
+    std::vector<std::size_t> places(to_.points.size(), 0);  // of the nodes in the result, where they have one in the present row
     for (std::uint32_t point = 0; point < points; ++point) {
-      const auto begin = sorted.begin() + static_cast<std::ptrdiff_t>(starts[point]), end = sorted.begin() + static_cast<std::ptrdiff_t>(starts[point + 1]);
-      std::stable_sort(begin, end, [](const auto& a, const auto& b) { return a.first < b.first; });
+      const auto start = result.starts.back();
       double sum = 0;
-      for (auto entry = begin; entry != end; ++entry) {
-        sum += entry->second;
-        if (result.nodes.size() > result.starts.back() && result.nodes.back() == entry->first) {
-          result.weights.back() += entry->second;
-          continue;
+      for (auto k = starts[point]; k < starts[point + 1]; ++k) {
+        const auto& part = parts_[sorted[k]];
+        for (std::size_t n = 0; n < part.count; ++n) {
+          const auto node = part_nodes_[part.nodes + n];
+          const double value = part_values_[part.values + n];
+          sum += value;
+          auto& place = places[node];
+          if (place < start || place >= result.nodes.size() || result.nodes[place] != node) {
+            place = result.nodes.size();
+            result.nodes.push_back(node);
+            result.weights.push_back(0);
+          }
+          result.weights[place] += value;
         }
-        result.nodes.push_back(entry->first);
-        result.weights.push_back(entry->second);
       }
       if (!(sum > least_cover * whole_[point])) {  // a hair's breadth says nothing about where a force goes
-        result.nodes.resize(result.starts.back());
-        result.weights.resize(result.starts.back());
+        result.nodes.resize(start);
+        result.weights.resize(start);
       }
-      for (auto k = result.starts.back(); k < result.weights.size(); ++k) result.weights[k] /= sum;
+      for (auto k = start; k < result.weights.size(); ++k) result.weights[k] /= sum;
       result.starts.push_back(result.nodes.size());
     }
     return result;
   }
 
  private:
-  struct Entry {
-    std::uint32_t point, node;
-    double value;
+  /// What a face of `from` adds to the row of one of its points.
+  struct Part {
+    std::uint32_t point, count;  // of nodes
+    std::size_t nodes, values;   // the first of them
   };
 
   void add(const Piece& piece) {
@@ -199,14 +235,15 @@ class Integration {
     add_mass(piece, measure);
     Vec3 middle = Vec3::Zero();
     for (std::size_t k = 0; k < piece.count; ++k) middle += c[k].at / static_cast<double>(piece.count);
-    const auto nearest = search_.nearest(middle, max_distance_);
+    const auto nearest = search_.nearest(middle, max_distance_, nearest_);
     if (!nearest) return;
+    nearest_ = nearest->face;
     const double farthest = std::min(max_distance_, nearest->projection.distance + nearly_as_far * size);
 
     Vec3 low = c[0].at, high = low;
     for (std::size_t k = 1; k < piece.count; ++k) low = low.cwiseMin(c[k].at), high = high.cwiseMax(c[k].at);
     near_.clear();
-    search_.grid().for_each_near(low - Vec3::Constant(farthest), high + Vec3::Constant(farthest), [&](std::uint32_t face) { near_.push_back(face); });
+    search_.for_each_touching(low - Vec3::Constant(farthest), high + Vec3::Constant(farthest), [&](std::uint32_t face) { near_.push_back(face); });
     std::sort(near_.begin(), near_.end());
     near_.erase(std::unique(near_.begin(), near_.end()), near_.end());
     for (const auto face : near_) {
@@ -245,24 +282,25 @@ class Integration {
     if (geometry::corners_of(kind) < 3) return;
     const std::array<Vec2, 3> corners{frame(piece.corners[0].at), frame(piece.corners[1].at), frame(piece.corners[2].at)};
     const double whole = cross(corners[1] - corners[0], corners[2] - corners[0]);
-    if (is_affine(kind)) return cover_affinely(piece, frame, normal, corners, whole, face, farthest);
+    if (affine_[face]) return cover_affinely(piece, frame, normal, corners, whole, face, farthest);
     for_each_piece(to_, face, [&](const Piece& under) {
       const Vec3 area = (under.corners[1].at - under.corners[0].at).cross(under.corners[2].at - under.corners[0].at);
       if (!(std::abs(area.dot(normal)) >= least_cosine * area.norm()) || area.norm() == 0) return;
       std::array<Vec2, 3> triangle;
       for (std::size_t k = 0; k < 3; ++k) triangle[k] = frame(under.corners[k].at);
       const double turn = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-      polygon_.assign(triangle.begin(), triangle.end());
-      if (turn < 0) std::reverse(polygon_.begin(), polygon_.end());
-      for (std::size_t k = 0; k < 3 && polygon_.size() > 2; ++k) clip(polygon_, storage_, corners[k], corners[(k + 1) % 3]);
-      if (polygon_.size() < 3) return;
+      Polygon polygon;
+      for (const auto& p : triangle) polygon.push_back(p);
+      if (turn < 0) polygon.reverse();
+      polygon.clip(corners);
+      if (polygon.size() < 3) return;
 
       const std::array<Vec2, 3> at_corners{parameters(kind, under.corners[0]), parameters(kind, under.corners[1]), parameters(kind, under.corners[2])};
       const auto shapes_at = [&](const Vec2& p) {
         const double first = cross(triangle[1] - p, triangle[2] - p) / turn, second = cross(triangle[2] - p, triangle[0] - p) / turn;
         return located(kind, frame, p, first * at_corners[0] + second * at_corners[1] + (1 - first - second) * at_corners[2]);
       };
-      const auto middle = centroid(polygon_, no_more_than_an_edge * whole);
+      const auto middle = centroid(polygon, no_more_than_an_edge * whole);
       if (!middle || distance(shapes_at(*middle), frame.at(*middle)) > farthest) return;
       begin(face);
       const auto take = [&](const Vec2& p, double weight) {
@@ -270,8 +308,8 @@ class Integration {
         gather({first, second, 1 - first - second}, 3, shapes_at(p), weight);
       };
       // A fan about the middle: which corner comes first is a matter of round-off, where two faces share an edge.
-      for (std::size_t k = 0; k < polygon_.size(); ++k) {
-        const Vec2 &a = *middle, &b = polygon_[k], &c = polygon_[(k + 1) % polygon_.size()];
+      for (std::size_t k = 0; k < polygon.size(); ++k) {
+        const Vec2 &a = *middle, &b = polygon[k], &c = polygon[(k + 1) % polygon.size()];
         const double half = 0.5 * cross(b - a, c - a);
         const auto add_all = [&](const auto& rule) {
           for (const auto& [place, weight] : rule) take(place[0] * a + place[1] * b + place[2] * c, weight * half);
@@ -283,16 +321,20 @@ class Integration {
   }
 
   /// A triangle, or a parallelogram, whose middles are in the middle: its parameters are linear in the place.
-  bool is_affine(FaceKind kind) const {
+  static bool is_affine(const SurfaceMesh& surface, std::size_t face) {
+    const auto kind = surface.kind(face);
+    const auto nodes = surface.nodes(face);
     const auto corners = geometry::corners_of(kind);
     if (kind == FaceKind::triangle3) return true;
-    const Vec3 u = points_[1] - points_[0], v = points_[corners - 1] - points_[0];
+    if (corners < 3) return false;
+    const auto point = [&](std::size_t k) -> const Vec3& { return surface.points[nodes[k]]; };
+    const Vec3 u = point(1) - point(0), v = point(corners - 1) - point(0);
     const double slack = 1e-12 * (u.norm() + v.norm());
-    if (corners == 4 && (points_[2] - points_[0] - u - v).norm() > slack) return false;
-    for (std::size_t k = corners; k < points_.size(); ++k) {
+    if (corners == 4 && (point(2) - point(0) - u - v).norm() > slack) return false;
+    for (std::size_t k = corners; k < nodes.size(); ++k) {
       const auto& at = node_parameters(kind)[k];
       const double s = corners == 4 ? 0.5 * (1 + at[0]) : at[0], t = corners == 4 ? 0.5 * (1 + at[1]) : at[1];
-      if ((points_[k] - points_[0] - s * u - t * v).norm() > slack) return false;
+      if ((point(k) - point(0) - s * u - t * v).norm() > slack) return false;
     }
     return true;
   }
@@ -305,24 +347,25 @@ class Integration {
     if (!(std::abs(area.dot(normal)) >= least_cosine * area.norm()) || area.norm() == 0) return;
     const Vec2 origin = frame(points_[0]), along = frame(points_[1]) - origin, across = frame(points_[count - 1]) - origin;
     const double turn = cross(along, across);
-    polygon_.clear();
-    for (std::size_t k = 0; k < count; ++k) polygon_.push_back(frame(points_[k]));
-    if (turn < 0) std::reverse(polygon_.begin(), polygon_.end());
-    for (std::size_t k = 0; k < 3 && polygon_.size() > 2; ++k) clip(polygon_, storage_, corners[k], corners[(k + 1) % 3]);
-    if (polygon_.size() < 3) return;
-    const auto middle = centroid(polygon_, no_more_than_an_edge * whole);
+    Polygon polygon;
+    for (std::size_t k = 0; k < count; ++k) polygon.push_back(frame(points_[k]));
+    if (turn < 0) polygon.reverse();
+    polygon.clip(corners);
+    if (polygon.size() < 3) return;
+    const auto middle = centroid(polygon, no_more_than_an_edge * whole);
     if (!middle) return;
-    const auto place = [&](const Vec2& p) { return Vec2(cross(p - origin, across) / turn, cross(along, p - origin) / turn); };
+    const double per_turn = 1 / turn, per_whole = 1 / whole;
+    const auto place = [&](const Vec2& p) { return Vec2(per_turn * cross(p - origin, across), per_turn * cross(along, p - origin)); };
     const Vec2 share = place(*middle);
     if ((points_[0] + share[0] * u + share[1] * v - frame.at(*middle)).norm() > farthest) return;
     begin(face);
     const auto take = [&](const Vec2& p, double weight) {
-      const double first = cross(corners[1] - p, corners[2] - p) / whole, second = cross(corners[2] - p, corners[0] - p) / whole;
+      const double first = per_whole * cross(corners[1] - p, corners[2] - p), second = per_whole * cross(corners[2] - p, corners[0] - p);
       const Vec2 at = place(p);
       gather({first, second, 1 - first - second}, 3, shape_functions(kind, count == 4 ? Vec2(2 * at[0] - 1, 2 * at[1] - 1) : at), weight);
     };
-    for (std::size_t k = 1; k + 1 < polygon_.size(); ++k) {
-      const Vec2 &a = polygon_[0], &b = polygon_[k], &c = polygon_[k + 1];
+    for (std::size_t k = 1; k + 1 < polygon.size(); ++k) {
+      const Vec2 &a = polygon[0], &b = polygon[k], &c = polygon[k + 1];
       const double half = 0.5 * cross(b - a, c - a);
       const auto add_all = [&](const auto& rule) {
         for (const auto& [at, weight] : rule) take(at[0] * a + at[1] * b + at[2] * c, weight * half);
@@ -330,7 +373,7 @@ class Integration {
       switch (kind) {
         case FaceKind::triangle3: add_all(three_points); break;
         case FaceKind::quad9: add_all(seven_points); break;
-        default: add_all(six_points);
+        default: add_all(four_points);
       }
     }
     enter(piece);
@@ -410,7 +453,7 @@ class Integration {
   /// A face of `from` is done: its hat functions become their duals where it is covered.
   void enter(std::span<const std::uint32_t> nodes) {
     const auto size = std::ssize(nodes);
-    const Eigen::VectorXd wholes = hats_.rowwise().sum();
+    const FaceVector wholes = hats_.rowwise().sum();
     for (Eigen::Index i = 0; i < size; ++i) whole_[nodes[static_cast<std::size_t>(i)]] += wholes[i];
     double covered = 0;
     for (const auto& shares : shares_)
@@ -418,29 +461,37 @@ class Integration {
     const bool dual = std::abs(covered - wholes.sum()) <= almost_all * wholes.sum();
     // Of triangles and of lines all are alike, 4 δ − 1 and 3 δ − 1.
     if (dual && from_kind_ == FaceKind::triangle3) duals_ = 4 * Eigen::Matrix3d::Identity() - Eigen::Matrix3d::Ones();
+    else if (dual && from_kind_ == FaceKind::quad4) duals_ = wholes.asDiagonal() * Eigen::Matrix4d(hats_).inverse();
     else if (dual) duals_ = wholes.asDiagonal() * hats_.inverse();
-    for (std::size_t k = 0; k < under_.size(); ++k) {
-      const Eigen::VectorXd shares = Eigen::Map<const Eigen::VectorXd>(shares_[k].data(), size);
-      const Eigen::VectorXd values = dual ? Eigen::VectorXd(duals_ * shares) : shares;
-      for (Eigen::Index i = 0; i < size; ++i)
-        if (values[i] != 0) entries_.push_back({nodes[static_cast<std::size_t>(i)], under_[k], values[i]});
-    }
+    const auto count = under_.size();
+    if (count == 0) return;
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      parts_.push_back({nodes[i], static_cast<std::uint32_t>(count), part_nodes_.size(), part_values_.size() + i * count});
+    part_nodes_.insert(part_nodes_.end(), under_.begin(), under_.end());
+    for (Eigen::Index i = 0; i < size; ++i)
+      for (const auto& of_node : shares_) {
+        const Eigen::Map<const FaceVector> shares(of_node.data(), size);
+        part_values_.push_back(dual ? duals_.row(i).dot(shares) : shares[i]);
+      }
   }
 
   const SurfaceMesh &from_, &to_;
   const PartnerSearch& search_;
   double max_distance_;
+  std::vector<bool> affine_;   // which faces of `to` are
   std::vector<double> whole_;  // ∫ N_i dA of each point [m], [m²]
+  std::optional<std::uint32_t> nearest_;  // face of `to`, of the piece before
   std::vector<std::uint32_t> near_;
   std::vector<Vec3> points_;  // of the face of `to` under work
-  Polygon polygon_, storage_;
   FaceKind from_kind_ = FaceKind::line2;
   std::uint32_t face_ = 0;
   std::array<FaceValues, 3> sums_;  // of a piece and a face of `to`, by corner and node
-  Eigen::MatrixXd hats_, duals_;    // of a face of `from`
+  FaceMatrix hats_, duals_;         // of a face of `from`
   std::vector<std::uint32_t> under_;  // nodes of `to` that have a share of it, and the shares by its nodes
   std::vector<FaceValues> shares_;
-  std::vector<Entry> entries_;
+  std::vector<Part> parts_;
+  std::vector<std::uint32_t> part_nodes_;
+  std::vector<double> part_values_;
 };
 
 }  // namespace

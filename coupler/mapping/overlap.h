@@ -21,7 +21,7 @@ namespace acopla::coupler {
 struct Overlap {
   // Row i of the weights: nodes and weights from starts[i] to starts[i + 1]; empty where nothing of `to` lies over the faces around i.
   std::vector<std::size_t> starts{0};
-  std::vector<std::uint32_t> nodes;
+  std::vector<std::uint32_t> nodes;  ///< of faces over those around the point, each once, also where the weight is zero or round-off
   std::vector<double> weights;  ///< sum 1 in each row
 };
 

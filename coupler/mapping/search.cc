@@ -42,6 +42,13 @@ class Examined {
       if (faces_[k] == face) return &distances_[k];
     return nullptr;
   }
+  bool forgot() const { return count_ > faces_.size(); }
+  /// The lowest face within a distance, of those held.
+  std::uint32_t lowest_within(double distance, std::uint32_t lowest) const {
+    for (std::size_t k = 0; k < std::min(count_, faces_.size()); ++k)
+      if (distances_[k] <= distance) lowest = std::min(lowest, faces_[k]);
+    return lowest;
+  }
   void put(std::uint32_t face, double distance) {
     const std::size_t place = count_++ % faces_.size();
     faces_[place] = face;
@@ -79,7 +86,7 @@ std::optional<std::uint32_t> PartnerSearch::nearest_middle(const Vec3& x, double
   return nearest;
 }
 
-std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance) const {
+std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance, std::optional<std::uint32_t> guess) const {
   if (boxes_.empty() || !x.allFinite()) return {};
   Partner partner;
   Examined known;
@@ -89,10 +96,15 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
     const auto projection = project(face, x);
     ++partner.examined;
     known.put(face, projection.distance);
+    if (projection.distance < least) {
+      least = projection.distance;
+      partner.face = face;
+      partner.projection = projection;
+    }
     return projection.distance;
   };
   const auto for_each_within = [&](double reach, auto&& visit) {
-    const Vec3 half = Vec3::Constant(reach + tie_);
+    const Vec3 half = Vec3::Constant(reach + 2 * tie_);
     grid_.for_each_near(x - half, x + half, visit);
   };
 
@@ -100,34 +112,33 @@ std::optional<Partner> PartnerSearch::nearest(const Vec3& x, double max_distance
   // It starts far below a bucket: most points lie almost on the surface, and one bucket then offers
   // a bound at once.
   const auto near_enough = [&](std::uint32_t face) {
-    return distance_to(boxes_[face], x) <= std::min(least, max_distance) + tie_;
-  };
-  const auto examine = [&](std::uint32_t face) {
-    const double distance = distance_of(face);
-    if (distance >= least) return;
-    least = distance;
-    partner.face = face;
+    return distance_to(boxes_[face], x) <= std::min(least, max_distance) + 2 * tie_;
   };
   double half = std::max(0.03 * grid_.smallest_size(), distance_to(grid_.bounds(), x));
+  if (guess && distance_of(*guess) <= grid_.size()) half = std::max(half, least);  // a bad guess must not open a wide box
   while (true) {
     const double reach = std::min(half, max_distance);
     if (!std::isfinite(least))
-      if (const auto seed = nearest_middle(x, reach)) examine(*seed);
+      if (const auto seed = nearest_middle(x, reach)) distance_of(*seed);
     for_each_within(reach, [&](std::uint32_t face) {
-      if (near_enough(face)) examine(face);
+      if (near_enough(face)) distance_of(face);
     });
     if (least <= reach || !(reach < max_distance)) break;
     half = std::min(least, 4 * half);
   }
   if (!(least <= max_distance)) return {};
 
-  // The lowest index among all that lie as near.
-  for_each_within(least + tie_, [&](std::uint32_t face) {
-    if (face < partner.face && distance_to(boxes_[face], x) <= least + 2 * tie_ &&
-        distance_of(face) <= least + tie_)
-      partner.face = face;
-  });
-  partner.projection = project(partner.face, x);
+  // The lowest index among all that lie as near, which have all been examined.
+  const double as_near = least + tie_;
+  auto lowest = known.lowest_within(as_near, partner.face);
+  if (known.forgot())
+    for_each_within(as_near, [&](std::uint32_t face) {
+      if (face < lowest && distance_to(boxes_[face], x) <= as_near + tie_ && distance_of(face) <= as_near) lowest = face;
+    });
+  if (lowest != partner.face) {
+    partner.face = lowest;
+    partner.projection = project(lowest, x);
+  }
   return partner;
 }
 

@@ -30,13 +30,22 @@ class PartnerSearch {
 
   /// Nearest face to `x` [m] within `max_distance` [m] (which may be infinite), or nothing. Nothing
   /// for an `x` with a NaN.
-  std::optional<Partner> nearest(const Vec3& x, double max_distance) const;
+  /// @param guess  a face that may be near, as that of the point before: the answer is the same, and comes sooner
+  std::optional<Partner> nearest(const Vec3& x, double max_distance, std::optional<std::uint32_t> guess = {}) const;
 
   /// The same by looking at every face.
   std::optional<Partner> nearest_exhaustive(const Vec3& x, double max_distance) const;
 
   double tie_tolerance() const { return tie_; }  ///< 1e-12 of the surface's extent [m]
-  const geometry::BucketGrid& grid() const { return grid_; }
+
+  /// Calls `visit(face)` for every face whose box touches the box [low, high], for some more than once.
+  template <class Visit>
+  void for_each_touching(const Vec3& low, const Vec3& high, Visit&& visit) const {
+    grid_.for_each_near(low, high, [&](std::uint32_t face) {
+      const auto& box = boxes_[face];
+      if ((low.array() <= box.high.array()).all() && (high.array() >= box.low.array()).all()) visit(face);
+    });
+  }
 
  private:
   FaceProjection project(std::uint32_t face, const Vec3& x) const;

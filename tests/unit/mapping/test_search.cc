@@ -19,6 +19,12 @@ void expect_same(const PartnerSearch& search, const Vec3& x, double limit) {
   EXPECT_EQ(bucket->face, oracle->face) << x.transpose();
   EXPECT_EQ(bucket->projection.weights,
             oracle->projection.weights);  // the same arithmetic, to the bit
+  for (const auto guess : {0u, oracle->face, oracle->examined - 1}) {  // first, right, last
+    const auto guessed = search.nearest(x, limit, guess);
+    ASSERT_TRUE(guessed);
+    EXPECT_EQ(guessed->face, oracle->face) << x.transpose() << " guessing " << guess;
+    EXPECT_EQ(guessed->projection.weights, oracle->projection.weights);
+  }
 }
 
 TEST(PartnerSearch, BucketsEqualTheExhaustiveSearchForRandomPoints) {
