@@ -1,4 +1,4 @@
-// What two-way coupling costs and how well it does, as JSON lines: coupling orders | map [--coarse] | overhead VERTICES WINDOWS | long WINDOWS | mapping VERTICES [--overlap]
+// What two-way coupling costs and how well it does, as JSON lines: coupling orders | map [--coarse] | overhead VERTICES WINDOWS | long WINDOWS [--recorded] | mapping VERTICES [--overlap]
 #include <fmt/format.h>
 #include <malloc.h>
 
@@ -241,15 +241,15 @@ class Scales final : public in_process::Door {
   std::size_t early = 0, late = 0;
 };
 
-// Coupler and two participants in one process, with all that a run writes.
-void long_run(std::int64_t windows) {
+// Coupler and two participants in one process, with all that a run writes or nothing.
+void long_run(std::int64_t windows, bool recorded) {
   Idle first("spring", {"force"}, 1), second("mass", {"displacement", "velocity"}, 1);
   const auto results = std::filesystem::temp_directory_path() / fmt::format("acopla-long-{}", getpid());
   std::filesystem::create_directories(results);
   Scales scales;
   const auto text = fmt::format("dimension = 3\nend = {}\n[coupling]\nwindow = 1\nmax_distance = 0.1\nscheme = \"explicit\"\n[[coupling.interface]]\n"
                                 "from = \"first.spring\"\nto = \"second.mass\"\n[first]\ncommand = [\"a\"]\n[second]\ncommand = [\"b\"]\n", windows);
-  const auto outcome = in_process::run(text, {{"first", &first}, {"second", &second}}, "inproc://long", scales, std::getenv("NORES") ? "" : results.string());
+  const auto outcome = in_process::run(text, {{"first", &first}, {"second", &second}}, "inproc://long", scales, recorded ? results.string() : "");
   std::filesystem::remove_all(results);
   fmt::print("{{\"windows\": {}, \"met\": {}, \"early\": {}, \"late\": {}, \"seconds\": {:.4g}}}\n", windows, outcome.error ? "false" : "true", scales.early,
              scales.late, outcome.seconds);
@@ -281,10 +281,10 @@ int main(int argc, char** argv) {
   if (mode == "orders") orders();
   else if (mode == "map") map(argc > 2 && std::string(argv[2]) == "--coarse");
   else if (mode == "overhead" && argc > 3) overhead(std::stoull(argv[2]), std::stoll(argv[3]));
-  else if (mode == "long" && argc > 2) long_run(std::stoll(argv[2]));
+  else if (mode == "long" && argc > 2) long_run(std::stoll(argv[2]), argc > 3);
   else if (mode == "mapping" && argc > 2) mapping(std::stoull(argv[2]), argc > 3 ? coupler::MappingKind::overlap : coupler::MappingKind::conservative);
   else {
-    fmt::print(stderr, "coupling orders | map [--coarse] | overhead VERTICES WINDOWS | long WINDOWS | mapping VERTICES [--overlap]\n");
+    fmt::print(stderr, "coupling orders | map [--coarse] | overhead VERTICES WINDOWS | long WINDOWS [--recorded] | mapping VERTICES [--overlap]\n");
     return 2;
   }
   return 0;

@@ -19,6 +19,7 @@ def run(study):
     map_of_schemes(study, cells)
     mappings(study)
     limits(study)
+    long_run(study)
     if not study.quick:  # times, which the company of other tests would decide
         speed(study)
         large_run(study)
@@ -112,6 +113,24 @@ def speed(study):
     overlap = lines(study, "mapping", 100000, "--overlap")[0]
     study.at_most(f"Mapping of {overlap['vertices']} vertices by overlap built [s]", "–", overlap["build"], 1.0, "{:.3f}")
     study.at_most(f"Mapping of {overlap['vertices']} vertices by overlap applied [ms]", "–", 1e3 * overlap["apply"], 10.0, "{:.2f}")
+
+
+def long_run(study):
+    """Memory over many windows, from a tenth of them on."""
+    windows = 20000 if study.quick else 1000000
+    rows = []
+    for recorded in (False, True):
+        count = windows if not recorded else windows // 5
+        run = lines(study, "long", count, *(["--recorded"] if recorded else []))[0]
+        grown = (run["late"] - run["early"]) / 2 ** 20
+        rows.append(["interface.h5 and all else" if recorded else "nothing", f"{count:,}", f"{run['early'] / 2 ** 20:.1f}", f"{run['late'] / 2 ** 20:.1f}",
+                     f"{run['late'] / 0.9 / count - run['early'] / 0.9 / count:.1f}", f"{run['seconds']:.0f}"])
+        if not recorded:
+            study.at_most(f"{windows:,} windows of explicit coupling: growth of the memory of coupler and participants after the first tenth [MiB]", "–",
+                          grown if run["met"] else None, 1.0, "{:.2f}")
+    study.table("A long run: memory of coupler and two idle participants in one process",
+                ["what is written", "windows", "after a tenth [MiB]", "at the end [MiB]", "growth [bytes a window]", "time [s]"], rows)
+    study.text("What HDF5 keeps of a record with thirty tables and two fields is what grows where one is written.")
 
 
 # --- a run of real solvers ---------------------------------------------------------------------------------------------
