@@ -108,6 +108,7 @@ Message welcome_message(const Run& run, const std::string& pulse_endpoint) {
                   {"gravity", run.gravity}, {"results", run.results}, {"uses", uses},
                   {"pulse", pulse_endpoint}};
   if (run.resumes) message.body["resumes"] = true;
+  if (run.wants_mass) message.body["wants_mass"] = true;
   return message;
 }
 
@@ -128,6 +129,7 @@ Welcome read_welcome(const Message& message) {
                                 value<std::vector<std::string>>(message, use, "sends")});
   welcome.pulse_endpoint = value<std::string>(message, body, "pulse");
   welcome.run.resumes = body.contains("resumes") && value<bool>(message, body, "resumes");
+  welcome.run.wants_mass = body.contains("wants_mass") && value<bool>(message, body, "wants_mass");
   return welcome;
 }
 
