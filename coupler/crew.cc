@@ -473,6 +473,7 @@ protocol::Run Crew::run_for(const ParticipantCase& participant) const {
   run.end = case_.windows;
   run.window = 1;
   run.resumes = resumes_;
+  run.wants_mass = case_.scheme == SchemeKind::serial_explicit || case_.scheme == SchemeKind::parallel_explicit;
   std::copy(case_.gravity.data(), case_.gravity.data() + 3, run.gravity);
   if (!results_.empty()) run.results = results_ + "/" + participant.name;
   run.uses = uses_of(case_, participant.name);

@@ -57,16 +57,15 @@ void add_stiffness(const Foundation& foundation, const Mesh& mesh, const Formula
   }
 }
 
-Vec3 force(const Foundation& foundation, const Mesh& mesh, const Formulation& formulation, const Vector& displacement) {
-  Vec3 sum = Vec3::Zero();
+void add_forces(const Foundation& foundation, const Mesh& mesh, const Formulation& formulation, const Vector& displacement, Vector& forces) {
   for (const auto& face : faces_of(foundation, mesh))
     visit_face(mesh, face, [&](const FacePoint& point) {
       Vec3 moved = Vec3::Zero();
       for (int a = 0; a < point.shape.size(); ++a)
         moved += point.shape[a] * value_at(displacement, face.nodes[static_cast<std::size_t>(a)], mesh.dimension());
-      sum -= springs(foundation, point, depth(mesh, formulation)) * moved;
+      const Vec3 pull = -springs(foundation, point, depth(mesh, formulation)) * moved;
+      for (int a = 0; a < point.shape.size(); ++a) add_at(forces, face.nodes[static_cast<std::size_t>(a)], mesh.dimension(), point.shape[a] * pull);
     });
-  return sum;
 }
 
 void mark(const Foundation& foundation, const Mesh& mesh, Fixed& held) {

@@ -27,8 +27,8 @@ std::vector<Foundation> read_foundations(const io::Table& structure, const std::
 /// @throws io::UserError located at the foundation when its part is not there; so do the next
 void add_stiffness(const Foundation& foundation, const Mesh& mesh, const Formulation& formulation, BlockMatrix& stiffness);
 
-/// Force of the foundation on the structure [N].
-Vec3 force(const Foundation& foundation, const Mesh& mesh, const Formulation& formulation, const Vector& displacement);
+/// Adds the foundation's forces on the nodes [N], whose sum and moment are those of its tractions.
+void add_forces(const Foundation& foundation, const Mesh& mesh, const Formulation& formulation, const Vector& displacement, Vector& forces);
 
 /// Marks the unknowns that springs act on: with them a body is not free.
 void mark(const Foundation& foundation, const Mesh& mesh, Fixed& held);

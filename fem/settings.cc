@@ -224,8 +224,6 @@ std::optional<Settings::Motion> read_motion(const io::Table& table) {
 std::vector<Settings::Torque> read_torques(const io::Table& output, const Settings& settings) {
   std::vector<Settings::Torque> torques;
   if (!output.has("torque")) return torques;
-  if (!settings.foundations.empty())
-    output.fail("torque", "is there without foundations: theirs is not known point by point. Leave one of them out.");
   for (const auto& [name, table] : output.table("torque").named_tables()) {
     Settings::Torque torque{name, table.has("about") ? table.vector("about", settings.dimension) : Vec3(Vec3::Zero()), Vec3::UnitZ()};
     if (settings.dimension == 3) {

@@ -159,10 +159,9 @@ std::vector<protocol::Surface> Structure::start(const protocol::Run& run) {
   else if (body_->moves())
     begin_motion();
   seconds_.factor = factor.seconds();
-  // What explicit schemes must know; nobody asks where nothing is sent back.
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     const auto& [use, interface] = coupled_[k];
-    if (!body_->moves() || use.sends.empty()) continue;
+    if (!run.wants_mass || !body_->moves() || use.sends.empty()) continue;
     const auto& held = body_->model.supports.fixed();
     const auto sudden_masses = body_->matrices->sudden(interface.nodes());
     for (std::size_t i = 0; i < sudden_masses.size(); ++i) {
@@ -248,7 +247,7 @@ void Structure::add_reactions(const Vector& reaction,
 }
 
 /// axis · Σ (x − about) × F; where displacements are large, of the places at the window's end.
-void Structure::add_torques(const Response& response, std::vector<std::pair<std::string, double>>& result) const {
+void Structure::add_torques(const Vector& reaction_forces, const Vector& loads, std::vector<std::pair<std::string, double>>& result) const {
   const auto& mesh = body_->model.mesh;
   for (const auto& [name, about, axis] : settings_.torques) {
     double reaction = 0, load = 0;
@@ -256,8 +255,8 @@ void Structure::add_torques(const Response& response, std::vector<std::pair<std:
       Vec3 arm = mesh.points()[n] - about;
       if (settings_.formulation.large) arm += value_at(state_.motion.displacement, n, mesh.dimension());
       const Vec3 turn = axis.cross(arm);  // axis · (arm × F) = (axis × arm) · F
-      reaction += turn.dot(value_at(response.reaction, n, mesh.dimension()));
-      load += turn.dot(value_at(response.load, n, mesh.dimension()));
+      reaction += turn.dot(value_at(reaction_forces, n, mesh.dimension()));
+      load += turn.dot(value_at(loads, n, mesh.dimension()));
     }
     result.emplace_back(name + ".torque.reaction", reaction);
     result.emplace_back(name + ".torque.load", load);
@@ -411,10 +410,12 @@ protocol::Advance Structure::advance(const protocol::Window& window,
 std::vector<std::pair<std::string, double>> Structure::quantities(const Response& response) const {
   const int dimension = settings_.dimension;
   std::vector<std::pair<std::string, double>> result;
-  Vec3 reaction = total(response.reaction, dimension);
-  const Vec3 load = total(response.load, dimension);
+  Vector with_foundations;
+  if (!settings_.foundations.empty()) with_foundations = response.reaction;
   for (const auto& foundation : settings_.foundations)
-    reaction += force(foundation, body_->model.mesh, settings_.formulation, state_.motion.displacement);
+    add_forces(foundation, body_->model.mesh, settings_.formulation, state_.motion.displacement, with_foundations);
+  const Vector& held = settings_.foundations.empty() ? response.reaction : with_foundations;
+  const Vec3 reaction = total(held, dimension), load = total(response.load, dimension);
   for (int d = 0; d < dimension; ++d)
     result.emplace_back(std::string("reaction.") + "xyz"[d], reaction[d]);
   for (int d = 0; d < dimension; ++d)
@@ -425,7 +426,7 @@ std::vector<std::pair<std::string, double>> Structure::quantities(const Response
   if (settings_.von_mises)
     result.emplace_back("von_mises.max", body_->stress.peak(state_.motion.displacement).value);
   add_reactions(response.reaction, result);
-  add_torques(response, result);
+  add_torques(held, response.load, result);
   add_probes(result);
   if (settings_.energy) {
     const auto& [kinetic, strain, work, support_work, damping] = state_.passed;

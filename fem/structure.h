@@ -58,7 +58,7 @@ class Structure : public protocol::Participant {
   void add_probes(std::vector<std::pair<std::string, double>>& result) const;
   void add_reactions(const Vector& reaction,
                      std::vector<std::pair<std::string, double>>& result) const;
-  void add_torques(const Response& response, std::vector<std::pair<std::string, double>>& result) const;
+  void add_torques(const Vector& reaction, const Vector& load, std::vector<std::pair<std::string, double>>& result) const;
   std::vector<std::pair<std::string, double>> quantities(const Response& response) const;
   std::vector<protocol::Field> fields() const;
   bool is_due(const protocol::Window& window) const;

@@ -75,6 +75,7 @@ ACOPLA_API int64_t acopla_window_length(const acopla_participant* p); /* nominal
 ACOPLA_API const double* acopla_gravity(const acopla_participant* p); /* 3 numbers [m/s2] */
 ACOPLA_API const char* acopla_results(const acopla_participant* p);  /* folder for own results; "": write none */
 ACOPLA_API int acopla_resumes(const acopla_participant* p);          /* 1: the handler `resume` will be called before the first window */
+ACOPLA_API int acopla_wants_mass(const acopla_participant* p);       /* 1: surfaces that send their motion should bring "mass" (below), if it is known */
 ACOPLA_API size_t acopla_use_count(const acopla_participant* p);     /* surfaces that are coupled */
 ACOPLA_API const char* acopla_use(const acopla_participant* p, size_t k); /* name of one; NULL beyond the last */
 ACOPLA_API int acopla_receives(const acopla_participant* p, const char* surface, const char* field); /* 1 or 0 */
@@ -84,7 +85,8 @@ ACOPLA_API int acopla_sends(const acopla_participant* p, const char* surface, co
 /* kinds: one a face; nodes: point numbers from 0, all faces one after another. Without faces kinds and nodes may be NULL. */
 ACOPLA_API int acopla_offer_surface(acopla_participant* p, const char* surface, size_t points, const double* xyz, size_t faces,
                                     const unsigned char* kinds, const int32_t* nodes);
-/* Where a surface is and how it moves when coupled time begins: field "displacement" [m], "velocity" [m/s] or "mass" [kg] per point. */
+/* Where a surface is and how it moves when coupled time begins: field "displacement" [m], "velocity" [m/s] per point; or "mass" [kg], what a sudden force
+   on that point alone would accelerate, by direction. */
 ACOPLA_API int acopla_set_initial(acopla_participant* p, const char* surface, const char* field, const double* values);
 ACOPLA_API int acopla_ready(acopla_participant* p);
 

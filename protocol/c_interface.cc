@@ -136,6 +136,7 @@ int64_t acopla_window_length(const acopla_participant* p) { return p ? p->sessio
 const double* acopla_gravity(const acopla_participant* p) { return p ? p->session.run().gravity : nullptr; }
 const char* acopla_results(const acopla_participant* p) { return p ? p->session.run().results.c_str() : ""; }
 int acopla_resumes(const acopla_participant* p) { return p && p->session.run().resumes; }
+int acopla_wants_mass(const acopla_participant* p) { return p && p->session.run().wants_mass; }
 size_t acopla_use_count(const acopla_participant* p) { return p ? p->session.run().uses.size() : 0; }
 const char* acopla_use(const acopla_participant* p, size_t k) {
   return k < acopla_use_count(p) ? p->session.run().uses[k].surface.c_str() : nullptr;

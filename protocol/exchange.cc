@@ -109,6 +109,7 @@ Message welcome_message(const Run& run, const std::string& pulse_endpoint, const
                   {"pulse", pulse_endpoint}};
   if (run.resumes) message.body["resumes"] = true;
   if (memory) message.body["memory"] = {{"requests", memory->requests}, {"answers", memory->answers}, {"token", memory->token}};
+  if (run.wants_mass) message.body["wants_mass"] = true;
   return message;
 }
 
@@ -135,6 +136,7 @@ Welcome read_welcome(const Message& message) {
     welcome.memory = {value<std::string>(message, offer, "requests"), value<std::string>(message, offer, "answers"),
                       value<std::uint64_t>(message, offer, "token")};
   }
+  welcome.run.wants_mass = body.contains("wants_mass") && value<bool>(message, body, "wants_mass");
   return welcome;
 }
 

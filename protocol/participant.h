@@ -35,6 +35,8 @@ struct Run {
   std::vector<Use> uses;
   /// A call of resume() follows start(): what it brings, particles that settle or an equilibrium, need not be made first.
   bool resumes = false;
+  /// Surfaces that send their motion should bring `mass`: an explicit scheme will ask how far it is from its limits. Otherwise nobody reads it.
+  bool wants_mass = false;
   double time(std::int64_t ticks) const { return static_cast<double>(ticks) * tick; }
 };
 

@@ -68,6 +68,7 @@ class Run:
     results: str    # folder for own results, to be made when needed; empty: write none
     uses: list      # of Use; other surfaces need not be computed or sent
     resumes: bool = False  # resume() follows start(): what it brings need not be made first
+    wants_mass: bool = False  # surfaces that send their motion should bring their mass, if it is known
 
     def time(self, ticks):
         return ticks * self.tick
@@ -304,7 +305,7 @@ def read_welcome(message):
             raise ProtocolError("\"uses\" of welcome is of the wrong type")
         uses.append(Use(_value(message, "surface", str, use), _texts(message, "receives", use), _texts(message, "sends", use)))
     run = Run(tick, _value(message, "end", int), _value(message, "window", int), numpy.array(gravity, float), _value(message, "results", str), uses,
-              bool(message.body.get("resumes", False)))
+              bool(message.body.get("resumes", False)), bool(message.body.get("wants_mass", False)))
     return run, _value(message, "pulse", str)
 
 

@@ -40,6 +40,7 @@ class CInterface : public ::testing::Test {
       run.end = 10;
       run.window = 1;
       run.results = "there";
+      run.wants_mass = true;
       run.uses = {{"top", {"force"}, {"displacement"}}};
       hub_.send(peer_, welcome_message(run, monitor_.endpoint()));
     });
@@ -86,6 +87,7 @@ TEST_F(CInterface, ARunFromHelloToFinish) {
   EXPECT_EQ(acopla_tick(participant_), 0.1);
   EXPECT_EQ(acopla_end(participant_), 10);
   EXPECT_STREQ(acopla_results(participant_), "there");
+  EXPECT_EQ(acopla_wants_mass(participant_), 1);
   ASSERT_EQ(acopla_use_count(participant_), 1u);
   EXPECT_STREQ(acopla_use(participant_, 0), "top");
   EXPECT_EQ(acopla_use(participant_, 1), nullptr);

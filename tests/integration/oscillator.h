@@ -113,16 +113,18 @@ class Loader : public protocol::Participant {
 class Structure : public protocol::Participant {
  public:
   double u = 0, v = 0, own_mass = mass, wall = wall_spring;
-  bool knows_its_mass = false;  ///< and says it, so that the coupler can judge
+  bool knows_its_mass = false;  ///< and says it where it is asked, so that the coupler can judge
+  bool was_asked = false;
 
   protocol::Introduction introduce() const override { return {"oscillator", 3, {"save", "checkpoint"}}; }
-  std::vector<protocol::Surface> start(const protocol::Run&) override {
+  std::vector<protocol::Surface> start(const protocol::Run& run) override {
     geometry::SurfaceMesh mesh;
     mesh.points = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
     mesh.add_face(geometry::FaceKind::triangle3, std::vector<std::uint32_t>{0, 1, 2});
     // A rigid body of three nodes: a third of the force, and of the mass, each.
     std::vector<Vec3> masses;
-    if (knows_its_mass) masses.assign(3, Vec3::Constant(own_mass / 3));
+    was_asked = run.wants_mass;
+    if (knows_its_mass && was_asked) masses.assign(3, Vec3::Constant(own_mass / 3));
     return {{"mass", mesh, std::vector<Vec3>(3, Vec3(u, 0, 0)), std::vector<Vec3>(3, Vec3(v, 0, 0)), masses}};
   }
   protocol::Advance advance(const protocol::Window& window, const std::vector<protocol::Field>& received) override {

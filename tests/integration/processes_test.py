@@ -5,6 +5,7 @@ Usage: processes_test.py FOLDER_OF_EXECUTABLES [test names].
 """
 
 import glob
+import json
 import os
 import shutil
 import signal
@@ -22,6 +23,7 @@ SLACK = float(os.environ.get("ACOPLA_TEST_SLACK", "3"))
 EPSILON = np.finfo(float).eps
 MPI = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
                     "OMPI_MCA_hwloc_base_binding_policy": "none"}
+ONE_THREAD = os.environ | {"OPENBLAS_NUM_THREADS": "1", "DEAL_II_NUM_THREADS": "1"}  # sums on several threads agree to round-off only
 
 # What differs: dimension, order, shape of the cells, what holds and loads the body, and how it moves.
 STATIC = {
@@ -67,6 +69,53 @@ reactions = true
 """
 
 
+# Discs fall onto a beam, bounce, and bend it.
+BEAM = """title = "beam"
+dimension = 2
+gravity = [0, -9.81]
+end = {end}
+[coupling]
+{scheme}
+window = 2e-4
+max_distance = 1e-3
+record_motion = true
+[[coupling.interface]]
+from = "discs.floor"
+to = "beam.y1"
+[discs]
+solver = "dem"
+[discs.material.disc]
+density = 500
+[[discs.contact]]
+between = [["disc", "disc"]]
+normal = {{ law = "linear", stiffness = 1e5 }}
+restitution = 0.5
+[discs.wall.floor]
+line = [[0, 0], [0.1, 0], [0.2, 0], [0.3, 0], [0.4, 0], [0.5, 0], [0.6, 0], [0.7, 0], [0.8, 0], [0.9, 0], [1, 0]]
+material = "disc"
+[[discs.insert]]
+material = "disc"
+particles = [{{ at = [0.31, 0.0102], diameter = 0.02, velocity = [0, -0.5] }}, {{ at = [0.52, 0.0104], diameter = 0.02, velocity = [0, -1] }}]
+[beam]
+solver = "fem"
+processes = {processes}
+mesh = {{ bar = {{ size = [1, 0.03], cells = [20, 1], origin = [0, -0.03] }} }}
+analysis = "dynamic"
+rayleigh = {{ mass = 10 }}
+[beam.material]
+young = 5e8
+poisson = 0.3
+density = 7800
+[beam.fix.x0]
+[beam.fix.x1]
+[beam.output]
+vtu = false
+hdf5 = true
+condition = true
+"""
+SCHEMES = {"explicit": 'scheme = "explicit"', "implicit": 'scheme = "implicit"\ntolerance = 1e-10'}
+
+
 def two_materials(path):
     """A bar of 8 cells, soft and stiff, as gmsh 2.2 writes it."""
     points = [(i, j, k) for i in range(9) for j in range(2) for k in range(2)]
@@ -99,14 +148,14 @@ class ProcessesTest(unittest.TestCase):
     def mpirun(self, processes, *command, timeout=120):
         return subprocess.run(["mpirun", "-np", str(processes), *command], env=MPI, capture_output=True, text=True, timeout=timeout, cwd=self.folder)
 
-    def solve(self, case, processes):
+    def solve(self, case, processes, name="structure"):
         """Displacements of all nodes and the quantities."""
         results = f"{self.folder}/results-{processes}"
         command = [f"{BIN}/acopla-fem", case, "--results", results]
         done = subprocess.run(command, capture_output=True, text=True) if processes == 1 else self.mpirun(processes, *command)
         self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
         values = {words[0]: float(words[1]) for words in map(str.split, done.stdout.splitlines()) if len(words) == 2}
-        with h5py.File(f"{results}/structure.h5") as file:
+        with h5py.File(f"{results}/{name}.h5") as file:
             found = []
             file.visititems(lambda name, item: found.append(item) if name.endswith("displacement") and isinstance(item, h5py.Dataset) else None)
             self.assertEqual(len(found), 1)
@@ -256,6 +305,61 @@ class ProcessesTest(unittest.TestCase):
         self.assertEqual(run.returncode, 0, err + out)
         with open(f"{self.folder}/results/summary.json") as stream:
             self.assertIn('"processes": 2', stream.read())
+
+    def beam(self, name, **values):
+        """A case of the beam, and how it is run to the folder `name`."""
+        case = self.write(BEAM.format(**values), f"{name}.toml")
+        return [f"{BIN}/acopla", "run", case, "--results", f"{self.folder}/{name}"]
+
+    def couple(self, command):
+        done = subprocess.run(command, env=ONE_THREAD, capture_output=True, text=True, timeout=120)
+        self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
+
+    def record(self, name):
+        """All that the interface's record holds, by name."""
+        found = {}
+        with h5py.File(f"{self.folder}/{name}/interface.h5") as file:
+            file.visititems(lambda key, item: found.update({key: item[...]}) if isinstance(item, h5py.Dataset) else None)
+        return found
+
+    def test_two_way_coupling(self):
+        """Forces and motion of every window, to what the stiffness's condition leaves of the equilibrium that the beam begins in."""
+        alone = BEAM.format(scheme='scheme = "one-way"', processes=1, end=0.01).replace('analysis = "dynamic"\nrayleigh = { mass = 10 }', "")
+        kappa = self.solve(self.write(alone[:alone.index("[[coupling.interface]]")] + alone[alone.index("[beam]"):]), 1, "beam")[1]["condition"]
+        for name, scheme in SCHEMES.items():
+            with self.subTest(name):
+                for processes in (1, 2):
+                    self.couple(self.beam(f"{name}{processes}", scheme=scheme, processes=processes, end=0.01))
+                one, two = self.record(name + "1"), self.record(name + "2")
+                self.assertEqual(set(one), set(two))
+                for key in ("beam.y1/force", "beam.y1/displacement", "beam.y1/velocity"):
+                    self.assertGreater(np.abs(one[key]).max(), 0)
+                    difference = np.abs(two[key] - one[key]).max() / np.abs(one[key]).max()
+                    print(f"  {name}, {key}: difference {difference:.1e} = {difference / (kappa * EPSILON):.2g} κ ε, κ = {kappa:.3g}", file=sys.stderr)
+                    self.assertLessEqual(difference, 10 * kappa * EPSILON, key)
+
+    def test_a_two_way_run_that_was_killed_is_resumed_bit_by_bit(self):
+        for name, scheme in SCHEMES.items():
+            with self.subTest(name):
+                values = {"scheme": scheme + "\ncheckpoint_every = 0.004", "processes": 2, "end": 0.02}
+                self.couple(self.beam(f"{name}-whole", **values))
+                command = self.beam(f"{name}-killed", **values)
+                run = subprocess.Popen(command, env=ONE_THREAD, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                until = time.monotonic() + 60
+                while not os.path.exists(f"{self.folder}/{name}-killed/checkpoint/coupler.h5") and time.monotonic() < until:
+                    time.sleep(0.01)
+                time.sleep(0.02)  # into windows that will be computed again
+                run.kill()
+                self.assertEqual(run.wait(), -signal.SIGKILL, "the run ended before it was killed")
+                until = time.monotonic() + 2 + SLACK
+                while self.processes() and time.monotonic() < until:
+                    time.sleep(0.02)
+                self.couple([f"{BIN}/acopla", "run", f"{self.folder}/{name}-killed.toml", "--resume", f"{self.folder}/{name}-killed"])
+                whole, resumed = self.record(f"{name}-whole"), self.record(f"{name}-killed")
+                self.assertEqual(set(whole), set(resumed))
+                self.assertEqual(len(whole["windows"]), 100)
+                for key in whole:
+                    self.assertEqual(whole[key].tobytes(), resumed[key].tobytes(), key)
 
     def test_a_death_ends_the_run(self):
         for victim in ("first", "second", "mpirun", "launcher"):

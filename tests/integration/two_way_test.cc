@@ -222,6 +222,16 @@ TEST(TwoWay, WhereBothSidesSaySoTheLimitIsWatched) {
   EXPECT_EQ(judged(1.01, "\nallow_unstable_scheme = true"), "");
 }
 
+// What a sudden force moves may cost a structure a while to work out, and only explicit schemes read it.
+TEST(TwoWay, ExplicitSchemesAloneAskForMasses) {
+  for (const auto& [coupling, asks] : {std::pair{serial, true}, {parallel, true}, {implicit, false}}) {
+    Swing s;
+    s.outcome = run(case_text(0.01, 0.02, coupling), s.first, s.second);
+    EXPECT_FALSE(s.outcome.error) << s.outcome.error->message;
+    EXPECT_EQ(s.second.was_asked, asks) << coupling;
+  }
+}
+
 // What the coupler says of a particle and a node is what becomes of them in a run.
 TEST(TwoWay, AParticleOnANodeGrowsAsEstimated) {
   const double window = 0.01;

@@ -74,6 +74,20 @@ TEST_F(AMovingStructure, BeginsInEquilibriumWithItsWeight) {
   EXPECT_EQ(found.count("von_mises.max"), 0u);  // not asked for
 }
 
+// A scene pays for what a sudden force moves only where an explicit scheme asks. Held nodes have none.
+TEST_F(AMovingStructure, KnowsWhatASuddenForceMovesWhereItIsAsked) {
+  EXPECT_TRUE(make().start(run()).at(0).mass.empty());
+  auto asked = run();
+  asked.wants_mass = true;
+  const auto surface = make("", "[structure.fix.x0]\n").start(asked).at(0);
+  ASSERT_EQ(surface.mass.size(), surface.mesh.points.size());
+  for (std::size_t n = 0; n < surface.mass.size(); ++n) {
+    const bool held = surface.mesh.points[n][0] == 0;
+    for (int d = 0; d < 3; ++d) EXPECT_EQ(surface.mass[n][d] > 0, !held) << n;
+    EXPECT_LT(surface.mass[n].maxCoeff(), density);  // of the 1 m³
+  }
+}
+
 TEST_F(AMovingStructure, FallsWhenNothingHoldsIt) {
   auto structure = make("start = \"rest\"\n", "");
   structure.start(run());

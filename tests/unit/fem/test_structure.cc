@@ -166,6 +166,59 @@ TEST_F(AStructure, ReactsWithItsFoundation) {
   EXPECT_NEAR(found.at("reaction.x"), 0, 1e-11 * weight);
 }
 
+// A block some hundred thousand times stiffer than its foundation: H along x on its top, 0.5 above its base, turns it by θ = H/2 / (k b L³/12) about
+// the middle of the base, and moves it by H/(k A) there. Its springs turn it back by k b L³/12 θ; about an axis 2 above the base, by what H has there.
+TEST_F(AStructure, StandsRigidOnItsFoundationUnderAMoment) {
+  constexpr double k = 1e4, shear = 30, force = 2 * shear, moment = 0.5 * force, inertia = 2. / 3;
+  auto structure = make("", "[structure.foundation.z0]\nstiffness = 1e4\ndirections = \"all\"\n[structure.load.z1]\ntraction = [30, 0, 0]\n"
+                            "[structure.output.torque.base]\naxis = [0, 1, 0]\n"
+                            "[structure.output.torque.above]\nabout = [5, 0, 2]\naxis = [0, 3, 0]\n"
+                            "[structure.output.point.heel]\nat = [0, 0, 0]\n[structure.output.point.toe]\nat = [2, 1, 0]\n");
+  auto alone = run();
+  alone.uses.clear();
+  structure.start(alone);
+  const auto found = quantities(structure.advance(window(0), {}));
+  const double turned = (found.at("heel.displacement.z") - found.at("toe.displacement.z")) / 2;
+  EXPECT_NEAR(turned, moment / (k * inertia), 3e-5 * turned);
+  EXPECT_NEAR(found.at("toe.displacement.x"), force / (k * 2), 3e-5 * force / (k * 2));
+  EXPECT_NEAR(found.at("base.torque.reaction"), -k * inertia * turned, 3e-5 * moment);
+  EXPECT_NEAR(found.at("base.torque.reaction"), -moment, 1e-8 * moment);
+  EXPECT_NEAR(found.at("base.torque.load"), moment, 1e-12 * moment);
+  EXPECT_NEAR(found.at("above.torque.reaction"), 1.5 * force, 1e-8 * force);
+  EXPECT_NEAR(found.at("above.torque.load"), -1.5 * force, 1e-12 * force);
+}
+
+// Springs along the normals of two sides, and a support across them: together they turn the block back by what its loads turn it, about any axis.
+TEST_F(AStructure, IsTurnedBackBySupportsAndFoundationsTogether) {
+  auto structure = make("", "[structure.foundation.z0]\nstiffness = 1e7\n[structure.foundation.x0]\nstiffness = 3e7\n[structure.fix.y0]\ndirections = [\"y\"]\n"
+                            "[structure.load.z1]\ntraction = [30, 20, -10]\n[structure.output]\nreactions = true\n"
+                            "[structure.output.torque.tilted]\nabout = [0.3, -1, 2]\naxis = [1, 2, -1]\n");
+  auto alone = run();
+  alone.uses.clear();
+  structure.start(alone);
+  const auto found = quantities(structure.advance(window(0), {}));
+  // H = (60, 40, −20) N at (1, 0.5, 0.5): (0.7, 1.5, −1.5) × H = (30, −76, −62) N m, along (1, 2, −1)/√6.
+  const double exact = (30 - 2 * 76 + 62) / std::sqrt(6.0);
+  EXPECT_NEAR(found.at("tilted.torque.load"), exact, 1e-10 * std::abs(exact));
+  EXPECT_NEAR(found.at("tilted.torque.reaction"), -exact, 1e-9 * std::abs(exact));
+  EXPECT_NEAR(found.at("y0.reaction.y"), -40, 1e-8);
+  EXPECT_NEAR(found.at("y0.reaction.x"), 0, 1e-12);  // the springs' forces are not the support's
+}
+
+TEST_F(AStructure, IsTurnedBackByItsFoundationIn2D) {
+  const std::string text =
+      "dimension = 2\n[structure]\nmesh = { bar = { size = [2, 1], cells = [4, 2] } }\nplane = \"stress\"\nthickness = 0.25\n"
+      "[structure.material]\nyoung = 1e9\npoisson = 0.2\n[structure.foundation.y0]\nstiffness = 1e6\ndirections = \"all\"\n"
+      "[structure.load.y1]\ntraction = [10, 0]\n[structure.output.torque.heel]\n";
+  Structure structure(read_settings(io::Table::from_text(text, "case.toml"), "structure"));
+  auto alone = run();
+  alone.uses.clear();
+  structure.start(alone);
+  const auto found = quantities(structure.advance(window(0), {}));
+  EXPECT_NEAR(found.at("heel.torque.load"), -5, 1e-12);  // 10 N/m² on 2 m of 0.25 m depth, 1 above the base
+  EXPECT_NEAR(found.at("heel.torque.reaction"), 5, 1e-9);
+}
+
 // Large displacements: a slender strip under P L²/(E I) = 10 bends to 0.810609 L (Mattiasson 1981),
 // whether in one window or in four, after an iteration that was rejected; small displacements would
 // say 3.33 L.

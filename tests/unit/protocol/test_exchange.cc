@@ -83,6 +83,9 @@ TEST(Exchange, Welcome) {
   EXPECT_EQ(welcome.run.uses[0].receives[0], "displacement");
   EXPECT_EQ(welcome.run.uses[0].sends[0], "force");
   EXPECT_EQ(welcome.pulse_endpoint, "ipc:///tmp/x/hub.pulse");
+  EXPECT_FALSE(welcome.run.wants_mass);
+  run.wants_mass = true;
+  EXPECT_TRUE(read_welcome(trip(welcome_message(run, ""))).run.wants_mass);
   auto message = welcome_message(run, "");
   for (const double tick : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
     message.body["tick"] = tick;
