@@ -11,6 +11,11 @@
 #include "fem/large_memory.h"
 #include "gmsh_writer.h"
 
+#ifdef __SANITIZE_ADDRESS__
+/// Memory that is not to be had is a null pointer here too, as std::bad_alloc is expected of it below.
+extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
+#endif
+
 namespace acopla::fem::test {
 namespace {
 
