@@ -1,8 +1,9 @@
-// What two-way coupling costs and how well it does, as JSON lines: coupling orders | map [--coarse] | overhead VERTICES WINDOWS | long WINDOWS [--recorded] | mapping VERTICES [--overlap]
+// What two-way coupling costs and how well it does, as JSON lines: coupling orders | map [--coarse] | overhead VERTICES WINDOWS | waking VERTICES SECONDS | long WINDOWS [--recorded] | mapping VERTICES [--overlap]
 #include <fmt/format.h>
 #include <malloc.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -165,14 +166,23 @@ class Idle final : public protocol::Participant {
   geometry::SurfaceMesh mesh_;
 };
 
+// Sweeps over memory as a solver does, for so long.
+void compute_for(double seconds) {
+  thread_local std::vector<double> field(2'000'000, 1.0);
+  for (const auto begin = Clock::now(); seconds_since(begin) < seconds;)
+    for (auto& value : field) value = 0.5 * value + 1;
+}
+
 // One exchange of a hub with each of two, of the same bytes as a window's, and nothing else.
-double ping_pongs(std::size_t points, std::int64_t rounds) {
+// @param work  of each of the two before it answers [s], which is not counted
+double ping_pongs(std::size_t points, std::int64_t rounds, double work = 0) {
   static int runs = 0;
   zmq::context_t context;
   const auto endpoint = fmt::format("ipc:///tmp/acopla-pingpong-{}-{}", getpid(), ++runs);
   const std::size_t one = 24 * points;
   zmq::socket_t hub(context, ZMQ_ROUTER);
   hub.bind(endpoint);
+  std::atomic<double> worked{0};  // the two take turns
   const auto answer = [&](const char* name, int arrays) {
     return std::thread([&, name, arrays] {
       zmq::socket_t socket(context, ZMQ_DEALER);
@@ -184,6 +194,11 @@ double ping_pongs(std::size_t points, std::int64_t rounds) {
         do {
           (void)socket.recv(frame);
         } while (frame.more());
+        if (work > 0) {
+          const auto begin = Clock::now();
+          compute_for(work);
+          worked = worked + seconds_since(begin);
+        }
         for (int a = 0; a < arrays; ++a) socket.send(zmq::message_t(one), a + 1 < arrays ? zmq::send_flags::sndmore : zmq::send_flags::none);
       }
     });
@@ -211,7 +226,7 @@ double ping_pongs(std::size_t points, std::int64_t rounds) {
   const double seconds = seconds_since(begin);
   first.join();
   second.join();
-  return seconds / static_cast<double>(rounds);
+  return (seconds - worked) / static_cast<double>(rounds);
 }
 
 void overhead(std::size_t vertices, std::int64_t windows) {
@@ -223,6 +238,11 @@ void overhead(std::size_t vertices, std::int64_t windows) {
     const auto coupled = run(0.5, windows, "scheme = \"explicit\"", first, second, "ipc");
     fmt::print("{{\"vertices\": {}, \"window\": {:.6g}, \"bare\": {:.6g}}}\n", points, coupled.seconds / static_cast<double>(windows), bare);
   }
+}
+
+// Bare messages between those that compute in between, and hot ones.
+void waking(std::size_t points, double work) {
+  fmt::print("{{\"cold\": {:.6g}, \"hot\": {:.6g}}}\n", ping_pongs(points, 100, work), ping_pongs(points, 1000));
 }
 
 std::size_t resident_bytes() {
@@ -281,10 +301,11 @@ int main(int argc, char** argv) {
   if (mode == "orders") orders();
   else if (mode == "map") map(argc > 2 && std::string(argv[2]) == "--coarse");
   else if (mode == "overhead" && argc > 3) overhead(std::stoull(argv[2]), std::stoll(argv[3]));
+  else if (mode == "waking" && argc > 3) waking(std::stoull(argv[2]), std::stod(argv[3]));
   else if (mode == "long" && argc > 2) long_run(std::stoll(argv[2]), argc > 3);
   else if (mode == "mapping" && argc > 2) mapping(std::stoull(argv[2]), argc > 3 ? coupler::MappingKind::overlap : coupler::MappingKind::conservative);
   else {
-    fmt::print(stderr, "coupling orders | map [--coarse] | overhead VERTICES WINDOWS | long WINDOWS [--recorded] | mapping VERTICES [--overlap]\n");
+    fmt::print(stderr, "coupling orders | map [--coarse] | overhead VERTICES WINDOWS | waking VERTICES SECONDS | long WINDOWS [--recorded] | mapping VERTICES [--overlap]\n");
     return 2;
   }
   return 0;

@@ -186,6 +186,10 @@ def large_run(study):
     study.table("The same: medians of five runs of 100 windows", ["what", "time [s]"],
                 [["windows", f"{windows:.3f}"], ["particles: 2,000 steps, the floor of 3,200 triangles moved by the plate", f"{dem:.3f}"],
                  ["structure: 100 solutions", f"{fem:.3f}"], ["the rest: messages, mapping, ledger, record, waking", f"{windows - dem - fem:.3f}"]])
+    bare = lines(study, "waking", (PLATE_CELLS[0] + 1) * (PLATE_CELLS[1] + 1), 0.02)[0]
+    study.text(f"Two bare ping-pongs of the same bytes between threads that compute for 20 ms each before they answer take {1e3 * bare['cold']:.2f} ms on this machine, "
+               f"{100 * bare['cold'] * 100 / windows:.1f} % of such a window, against {1e3 * bare['hot']:.2f} ms between threads that only answer: a core that slept, and whose caches are full of "
+               "other things, wakes slowly, at each of the six hops of a message and its answer (thread to input and output thread to socket, twice).")
     study.text(f"In turns (staggered), over ipc, three processes, interface.h5 written. Shares of the five runs: {', '.join(f'{s:.1f}' for s in shares)} %. The plate is heavier than "
                "steel (30 t/m³) and the particles take a fifth of their longest step, so that the staggered scheme is stable in windows of 20 steps.")
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fem/coupled_nodes.h"
-#include "fem/large_memory.h"
+#include "io/large_memory.h"
 #include "fem/mass_matrix.h"
 #include "fem/nodal.h"
 
@@ -50,7 +50,7 @@ class BlockMatrix {
 
   std::shared_ptr<const CoupledNodes> pattern_;
   int dimension_;
-  std::vector<double, LargeMemory<double>> values_;
+  std::vector<double, io::LargeMemory<double>> values_;
 };
 
 /// a K + b M. Both have the same pattern.

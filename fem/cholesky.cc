@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "fem/large_memory.h"
+#include "io/large_memory.h"
 #include "io/error.h"
 
 extern "C" void dgemm_(const char* transpose_a, const char* transpose_b, const int* m, const int* n,
@@ -101,7 +101,7 @@ struct Cholesky::State {
 
   State(const BlockMatrix& matrix_, const Fixed& fixed)
       : matrix(matrix_), dimension(static_cast<std::size_t>(matrix_.dimension())), free(fixed) {
-    SuiteSparse_config.malloc_func = allocate_large;
+    SuiteSparse_config.malloc_func = io::allocate_large;
     cholmod_l_start(&common);
     common.print = 0;
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geometry/surface_mesh.h"
+#include "io/large_memory.h"
 
 namespace acopla::coupler {
 
@@ -106,13 +107,13 @@ class Mapping {
   std::size_t to_count_;
   // Row i of H: nodes_ and weights_ from starts_[i] to starts_[i + 1]; empty without a partner.
   std::vector<std::size_t> starts_{0};
-  std::vector<std::uint32_t> nodes_;
-  std::vector<double> weights_;
+  std::vector<std::uint32_t, io::LargeMemory<std::uint32_t>> nodes_;
+  std::vector<double, io::LargeMemory<double>> weights_;
   // Couple c: couple_nodes_ and arms_ (x_k − x̄) from couple_starts_[c] to couple_starts_[c + 1].
   std::vector<Couple> couples_;
   std::vector<std::size_t> couple_starts_{0};
-  std::vector<std::uint32_t> couple_nodes_;
-  std::vector<Vec3> arms_;  // [m]
+  std::vector<std::uint32_t, io::LargeMemory<std::uint32_t>> couple_nodes_;
+  std::vector<Vec3, io::LargeMemory<Vec3>> arms_;  // [m]
 
   std::vector<std::uint32_t> unmapped_;
   double worst_distance_ = 0;

@@ -153,6 +153,7 @@ class Integration {
   Integration(const SurfaceMesh& from, const SurfaceMesh& to, const PartnerSearch& search, double max_distance)
       : from_(from), to_(to), search_(search), max_distance_(max_distance), whole_(from.points.size(), 0.0) {
     parts_.reserve(from.connectivity().size());
+    part_nodes_.reserve(12 * from.face_count());
     part_values_.reserve(12 * from.connectivity().size());  // nodes under a face of about the same size; what is never written costs nothing
     affine_.reserve(to.face_count());
     for (std::size_t face = 0; face < to.face_count(); ++face) affine_.push_back(is_affine(to, face));
@@ -489,9 +490,9 @@ class Integration {
   FaceMatrix hats_, duals_;         // of a face of `from`
   std::vector<std::uint32_t> under_;  // nodes of `to` that have a share of it, and the shares by its nodes
   std::vector<FaceValues> shares_;
-  std::vector<Part> parts_;
-  std::vector<std::uint32_t> part_nodes_;
-  std::vector<double> part_values_;
+  std::vector<Part, io::LargeMemory<Part>> parts_;
+  std::vector<std::uint32_t, io::LargeMemory<std::uint32_t>> part_nodes_;
+  std::vector<double, io::LargeMemory<double>> part_values_;
 };
 
 }  // namespace

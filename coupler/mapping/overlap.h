@@ -6,6 +6,7 @@
 
 #include "coupler/mapping/search.h"
 #include "geometry/surface_mesh.h"
+#include "io/large_memory.h"
 
 namespace acopla::coupler {
 
@@ -21,8 +22,8 @@ namespace acopla::coupler {
 struct Overlap {
   // Row i of the weights: nodes and weights from starts[i] to starts[i + 1]; empty where nothing of `to` lies over the faces around i.
   std::vector<std::size_t> starts{0};
-  std::vector<std::uint32_t> nodes;  ///< of faces over those around the point, each once, also where the weight is zero or round-off
-  std::vector<double> weights;  ///< sum 1 in each row
+  std::vector<std::uint32_t, io::LargeMemory<std::uint32_t>> nodes;  ///< of faces over those around the point, each once, also where the weight is zero or round-off
+  std::vector<double, io::LargeMemory<double>> weights;  ///< sum 1 in each row
 };
 
 /// @param search  of the faces of `to`; @param max_distance  [m] beyond which faces are no partners

@@ -1,8 +1,8 @@
-#include "fem/large_memory.h"
+#include "io/large_memory.h"
 
 #include <sys/mman.h>
 
-namespace acopla::fem {
+namespace acopla::io {
 namespace {
 
 constexpr std::size_t page = std::size_t{2} << 20;
@@ -20,4 +20,4 @@ void* allocate_large(std::size_t bytes) {
   return memory;
 }
 
-}  // namespace acopla::fem
+}  // namespace acopla::io

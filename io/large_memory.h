@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <new>
 
-namespace acopla::fem {
+namespace acopla::io {
 
 /// `bytes` of memory not set to anything, for std::free and std::realloc; nullptr when there is none. From some megabytes on it asks
 /// the kernel for pages of 2 MiB: a factor of 60 MB is then touched for the first time in 30 page faults instead of 15,000, which cost
@@ -28,4 +28,4 @@ struct LargeMemory {
   bool operator==(const LargeMemory&) const = default;
 };
 
-}  // namespace acopla::fem
+}  // namespace acopla::io
