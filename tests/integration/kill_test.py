@@ -321,7 +321,7 @@ class KillTest(unittest.TestCase):
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
         run = self.start(pause=1, preexec=little_room)
-        self.assert_failed(run, 2, "coupler", "interface.h5: the file cannot be written. Check the free space of the results folder.", 20)
+        self.assert_failed(run, 2, "coupler", ["interface.h5: ", "cannot be written. Check the free space of the results folder."], 20)
 
     def test_existing_results_are_refused(self):
         folder = tempfile.mkdtemp(prefix="kill-test-results-")
