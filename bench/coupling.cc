@@ -40,16 +40,19 @@ struct Result {
   double seconds = 0;
 };
 
+std::string case_text(double window, std::int64_t windows, const std::string& coupling) {
+  return fmt::format("dimension = 3\nend = {}\n[coupling]\nwindow = {}\nmax_distance = 0.1\n{}\n[[coupling.interface]]\n"
+                     "from = \"first.spring\"\nto = \"second.mass\"\n[first]\ncommand = [\"a\"]\n[second]\ncommand = [\"b\"]\n",
+                     window * static_cast<double>(windows), window, coupling);
+}
+
 // @param address  "inproc" or "ipc"
 Result run(double window, std::int64_t windows, const std::string& coupling, protocol::Participant& first, protocol::Participant& second,
            const std::string& address = "inproc") {
   static int runs = 0;
   const auto endpoint = address == "ipc" ? fmt::format("ipc:///tmp/acopla-bench-{}-{}", getpid(), ++runs) : fmt::format("inproc://bench-{}", ++runs);
-  const auto text = fmt::format("dimension = 3\nend = {}\n[coupling]\nwindow = {}\nmax_distance = 0.1\n{}\n[[coupling.interface]]\n"
-                                "from = \"first.spring\"\nto = \"second.mass\"\n[first]\ncommand = [\"a\"]\n[second]\ncommand = [\"b\"]\n",
-                                window * static_cast<double>(windows), window, coupling);
   Watch watch;
-  auto outcome = in_process::run(text, {{"first", &first}, {"second", &second}}, endpoint, watch);
+  auto outcome = in_process::run(case_text(window, windows, coupling), {{"first", &first}, {"second", &second}}, endpoint, watch);
   return {std::move(outcome), watch.seconds};
 }
 
@@ -267,9 +270,8 @@ void long_run(std::int64_t windows, bool recorded) {
   const auto results = std::filesystem::temp_directory_path() / fmt::format("acopla-long-{}", getpid());
   std::filesystem::create_directories(results);
   Scales scales;
-  const auto text = fmt::format("dimension = 3\nend = {}\n[coupling]\nwindow = 1\nmax_distance = 0.1\nscheme = \"explicit\"\n[[coupling.interface]]\n"
-                                "from = \"first.spring\"\nto = \"second.mass\"\n[first]\ncommand = [\"a\"]\n[second]\ncommand = [\"b\"]\n", windows);
-  const auto outcome = in_process::run(text, {{"first", &first}, {"second", &second}}, "inproc://long", scales, recorded ? results.string() : "");
+  const auto outcome = in_process::run(case_text(1, windows, "scheme = \"explicit\""), {{"first", &first}, {"second", &second}}, "inproc://long", scales,
+                                       recorded ? results.string() : "");
   std::filesystem::remove_all(results);
   fmt::print("{{\"windows\": {}, \"met\": {}, \"early\": {}, \"late\": {}, \"seconds\": {:.4g}}}\n", windows, outcome.error ? "false" : "true", scales.early,
              scales.late, outcome.seconds);

@@ -63,7 +63,8 @@ struct SeriesWriter::File {
     hsize_t size = 0;
     const bool known = H5Fflush(file.get(), H5F_SCOPE_LOCAL) >= 0 && H5Fget_filesize(file.get(), &size) >= 0;
     // Gives back what was reserved and not used: HDF5 does not know of it.
-    if (file.finish() && known && !abandoned && ::truncate(path.c_str(), static_cast<off_t>(size)) != 0) return;
+    std::error_code ignored;  // the file is whole, only longer
+    if (file.finish() && known && !abandoned) std::filesystem::resize_file(path, size, ignored);
   }
 
   [[noreturn]] void fail(const std::string& what) const {

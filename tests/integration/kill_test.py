@@ -316,7 +316,7 @@ class KillTest(unittest.TestCase):
     # --- results and addresses ---
 
     def test_full_disk(self):
-        # Files of 200 KB at most stand for it: writing beyond fails in every process. Pages of the log are not files.
+        # Files of 200 KB at most stand for it: writing beyond fails in every process.
         def little_room():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
