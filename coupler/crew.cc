@@ -17,7 +17,9 @@ using protocol::Kind;
 using protocol::Message;
 
 constexpr std::chrono::milliseconds tick{100};
-constexpr std::chrono::milliseconds look_interval{20};  // between looks after everybody, while answers come
+constexpr auto advancing = "advancing";
+constexpr double quick = 10e-3;  // an answer in less [s]
+constexpr std::chrono::milliseconds look_interval{100};  // between looks after everybody, while answers come
 // An exit is often seen before the last message of the process has been read.
 constexpr std::chrono::milliseconds last_words_wait{300};
 
@@ -94,8 +96,8 @@ void Crew::begin_advance(const std::string& participant, std::int64_t start, std
                          std::vector<protocol::Field> fields, bool estimate) {
   auto& member = members_.at(participant);
   const protocol::Window window{start, end, case_.time(start), case_.time(end) - case_.time(start), estimate};
-  enter(member, Member::Phase::advancing,
-        fmt::format("advancing from {:.6g} s to {:.6g} s", window.start_time, window.end_time()));
+  enter(member, Member::Phase::advancing, advancing);
+  member.window = window;
   if (member.replay) {
     take_advance(member, member.replay->advance(window, fields));
     return;
@@ -132,6 +134,14 @@ Crew::Answer Crew::next_answer() {
   auto answer = std::move(answers_.front());
   answers_.pop_front();
   return answer;
+}
+
+// A thread that carries a request, ZeroMQ's here or the participant's, is often woken on the core of whoever computes, and waits there until
+// that one has used up its slice, which may be three milliseconds. So we sleep for one, unless the answer may be here by then.
+void Crew::give_way() {
+  constexpr std::chrono::milliseconds pause{1};
+  const auto is_quick = [](const auto& entry) { return entry.second.phase == Member::Phase::advancing && entry.second.last_advance < quick; };
+  if (answers_.empty() && std::none_of(members_.begin(), members_.end(), is_quick)) turn(pause);
 }
 
 std::vector<std::pair<std::string, double>> Crew::finish() {
@@ -197,23 +207,23 @@ void Crew::hear(protocol::Arrival arrival) {
     fail(*member, fmt::format("sent something that is not the protocol: {}", arrival.fault));
   } else {
     try {
-      hear_member(*member, *arrival.message);
+      hear_member(*member, std::move(*arrival.message));
     } catch (const protocol::ProtocolError& error) {
       fail(*member, fmt::format("sent a message that cannot be used: {}", error.what()));
     }
   }
 }
 
-void Crew::hear_member(Member& member, const Message& message) {
+void Crew::hear_member(Member& member, Message message) {
   using Phase = Member::Phase;
   if (message.kind == Kind::error) {
     const auto error = protocol::read_error(message);
     if (!error.state.empty()) member.state = error.state;
     if (error.mistake)
-      throw Failure(member.about->name, member.state, error.text, Failure::Cause::mistake);
-    throw Failure(member.about->name, member.state,
+      throw Failure(member.about->name, state_of(member), error.text, Failure::Cause::mistake);
+    throw Failure(member.about->name, state_of(member),
                   fmt::format("{} ({}) failed while {}: {}", member.about->name,
-                              member.about->program(), member.state, error.text));
+                              member.about->program(), state_of(member), error.text));
   }
   const bool in_turn = (member.phase == Phase::starting && message.kind == Kind::interface) ||
                        (member.phase == Phase::advancing && message.kind == Kind::advanced) ||
@@ -227,7 +237,7 @@ void Crew::hear_member(Member& member, const Message& message) {
     if (protocol::found_memory(message)) hub_.use_memory(member.peer);
     take_surfaces(member, protocol::read_interface(message));
   }
-  if (message.kind == Kind::advanced) take_advance(member, protocol::read_advanced(message));
+  if (message.kind == Kind::advanced) return take_advance(member, protocol::read_advanced(std::move(message)));
   if (message.kind != Kind::done) return;
   if (member.phase == Phase::returning) enter(member, Phase::idle, "waiting for the others");
   else take_end(member, message);
@@ -359,7 +369,7 @@ void Crew::take_advance(Member& member, protocol::Advance advance) {
 
 void Crew::take_end(Member& member, const Message& message) {
   pulse_.forget(member.about->name);
-  for (const auto& [name, value] : protocol::read_values(message.body)) {
+  for (const auto& [name, value] : message.values) {
     if (name == "processes" && value >= 1 && value < 1e6) member.outcome.processes = static_cast<int>(value);
     if (name == "peak_bytes" && value >= 0 && value < 1e18)
       member.outcome.peak_bytes = static_cast<std::uint64_t>(value);
@@ -377,7 +387,7 @@ void Crew::heed(const Notice& notice) {
   if (notice.kind == Notice::Kind::exited) hear_last_words(member.peer);
   if (member.phase == Member::Phase::finished) return;
   if (notice.mistake && !notice.last_words.empty())
-    throw Failure(notice.participant, member.state, notice.last_words, Failure::Cause::mistake);
+    throw Failure(notice.participant, state_of(member), notice.last_words, Failure::Cause::mistake);
   fail(member, notice.how);
 }
 
@@ -414,12 +424,19 @@ void Crew::check_health() {
   }
 }
 
+// Put into words when somebody asks: windows are many.
+std::string Crew::state_of(const Member& member) {
+  if (member.state != advancing) return member.state;
+  return fmt::format("advancing from {:.6g} s to {:.6g} s", member.window.start_time, member.window.end_time());
+}
+
 // Books the time of the phase that ends.
 void Crew::enter(Member& member, Member::Phase phase, const std::string& state) {
   using Phase = Member::Phase;
   const auto now = Clock::now();
   const double spent = seconds_between(member.since, now);
   if (member.phase == Phase::idle) member.outcome.seconds_waiting += spent;
+  if (member.phase == Phase::advancing) member.last_advance = spent;
   if (member.phase == Phase::starting || member.phase == Phase::advancing ||
       member.phase == Phase::returning || member.phase == Phase::finishing)
     member.outcome.seconds += spent;
@@ -492,9 +509,9 @@ bool Crew::all_are(Member::Phase phase) const {
 }
 
 void Crew::fail(const Member& member, const std::string& message) const {
-  throw Failure(member.about->name, member.state,
+  throw Failure(member.about->name, state_of(member),
                 fmt::format("{} ({}) {} while {}.", member.about->name, member.about->program(),
-                            message, member.state));
+                            message, state_of(member)));
 }
 
 }  // namespace acopla::coupler

@@ -77,6 +77,8 @@ class Crew {
   };
   /// The next answer of anybody. @throws Failure, Interrupted
   Answer next_answer();
+  /// To be called after the last request and before work of one's own: lets it go on its way. @throws Failure, Interrupted
+  void give_way();
 
   /// Ends the run well. @return what the participants report at the end, as "participant.quantity"
   std::vector<std::pair<std::string, double>> finish();
@@ -103,12 +105,14 @@ class Crew {
       finished
     } phase = Phase::absent;
     std::string state = "not connected";
+    protocol::Window window;  // of the last advance
     double step = 0;     // the longest it takes [s]; 0: it does not say
     bool saves = false;
     std::uint64_t sequence = 0;
     std::map<std::string, geometry::SurfaceMesh> surfaces;
     std::map<std::string, Initial> initial;
     Clock::time_point since;  // of the phase
+    double last_advance = 0;  // took so long [s]
     ParticipantOutcome outcome;
   };
 
@@ -116,7 +120,7 @@ class Crew {
   void ask(const std::vector<std::string>& participants, protocol::Kind kind, const std::string& folder = {});
   void turn(std::chrono::milliseconds wait);
   void hear(protocol::Arrival arrival);
-  void hear_member(Member& member, const protocol::Message& message);
+  void hear_member(Member& member, protocol::Message message);
   void hear_stranger(const protocol::Arrival& arrival);
   void welcome(Member& member);
   void divide();
@@ -128,6 +132,7 @@ class Crew {
   void heed(const Notice& notice);
   void hear_last_words(const std::string& peer);
   void check_health();
+  static std::string state_of(const Member& member);
   void enter(Member& member, Member::Phase phase, const std::string& state);
   void request(Member& member, protocol::Message message);
   void start_replay(Member& member);

@@ -85,15 +85,13 @@ void TwoWay::state(Archive& archive) {
 template void TwoWay::state(io::StateWriter&);
 template void TwoWay::state(io::StateReader&);
 
-// Both sides compute while the books are kept: the structures while the forces are added up, and the loaders, in the next window already,
-// while this one is closed.
+// The loaders compute, in the next window already, while the books of this one are kept.
 void TwoWay::step_serially(WindowRecord& window) {
   Forces forces;
   Motions end;
   if (!begun_) begin_next(window_);
   load(window, forces, end);
   begin_structures(std::move(forces));
-  balance(window);
   Forces none;
   gather(structures_.size(), window, none, end);
   const auto start = std::exchange(now_, std::move(end));
@@ -101,7 +99,11 @@ void TwoWay::step_serially(WindowRecord& window) {
   begun_ = next < std::min(case_.windows, case_.next_checkpoint(window_));
   const double length = span_.length();
   span_.go_on(stability_, next);
-  if (begun_) begin_next(next);
+  if (begun_) {
+    begin_next(next);
+    crew_.give_way();
+  }
+  balance(window);
   book(window, window, start, moved_on(start, length), now_);
 }
 

@@ -56,6 +56,7 @@ std::vector<Vec3> vectors(const Array& array) {
 
 std::vector<Field> read_fields(const Message& message) {
   std::vector<Field> fields;
+  fields.reserve(message.arrays.size());
   for (const auto& array : message.arrays) fields.push_back({array.mesh(), array.name(), vectors(array)});
   return fields;
 }
@@ -231,45 +232,23 @@ AdvanceRequest read_advance(const Message& message, const std::vector<Run::Use>&
   return request;
 }
 
-namespace {
-
-Body pairs(const std::vector<std::pair<std::string, double>>& values) {
-  Body list = Body::array();  // a list keeps the order in which the solver reports
-  for (const auto& [name, number] : values) list.push_back({name, number});
-  return list;
-}
-
-}  // namespace
-
-std::vector<std::pair<std::string, double>> read_values(const Body& body) {
-  std::vector<std::pair<std::string, double>> values;
-  const auto found = body.find("values");
-  if (found == body.end()) return values;
-  if (!found->is_array()) throw ProtocolError("\"values\" is not a list of [name, number]");
-  for (const auto& pair : *found) {
-    if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_number())
-      throw ProtocolError("\"values\" is not a list of [name, number]");
-    values.emplace_back(pair[0].get<std::string>(), pair[1].get<double>());
-  }
-  return values;
-}
-
 Message advanced_message(Advance advance) {
   Message message;
   message.kind = Kind::advanced;
-  message.body = {{"values", pairs(advance.quantities)}, {"steps", advance.steps}};
+  message.body = {{"steps", advance.steps}};
+  message.values = std::move(advance.quantities);
   for (auto& field : advance.fields) message.arrays.push_back(vectors(field.name, field.surface, std::move(field.values)));
   return message;
 }
 
-Advance read_advanced(const Message& message) {
-  return {read_fields(message), read_values(message.body), value<std::uint64_t>(message, message.body, "steps")};
+Advance read_advanced(Message message) {
+  return {read_fields(message), std::move(message.values), value<std::uint64_t>(message, message.body, "steps")};
 }
 
-Message done_message(const std::vector<std::pair<std::string, double>>& values) {
+Message done_message(std::vector<std::pair<std::string, double>> values) {
   Message message;
   message.kind = Kind::done;
-  message.body = {{"values", pairs(values)}};
+  message.values = std::move(values);
   return message;
 }
 

@@ -44,11 +44,10 @@ struct AdvanceRequest {
 AdvanceRequest read_advance(const Message& message, const std::vector<Run::Use>& uses);
 
 Message advanced_message(Advance advance);
-Advance read_advanced(const Message& message);
+Advance read_advanced(Message message);
 
 /// An answer without fields: `done`, with scalar values.
-Message done_message(const std::vector<std::pair<std::string, double>>& values = {});
-std::vector<std::pair<std::string, double>> read_values(const Body& body);
+Message done_message(std::vector<std::pair<std::string, double>> values = {});
 
 /// `unsupported` tells a kind that this participant cannot do from a failure; `mistake` a user's mistake, whose text is a
 /// located sentence, from both.

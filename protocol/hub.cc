@@ -7,7 +7,6 @@
 
 #include <cstring>
 #include <filesystem>
-#include <thread>
 
 #include "io/error.h"
 #include "protocol/channel.h"
@@ -71,10 +70,7 @@ std::optional<Arrival> Hub::receive(std::chrono::milliseconds wait) {
 
 bool Hub::send(const std::string& peer, const Message& message) {
   const auto shared = shared_.find(peer);
-  const bool sent = protocol::send(socket_, message, peer, shared != shared_.end() && shared->second.found ? shared->second.memory.requests.get() : nullptr);
-  // ZeroMQ's thread that carries the message away is often woken on this core, where it would wait for us to finish the books.
-  std::this_thread::yield();
-  return sent;
+  return protocol::send(socket_, message, peer, shared != shared_.end() && shared->second.found ? shared->second.memory.requests.get() : nullptr);
 }
 
 std::optional<MemoryOffer> Hub::offer_memory(const std::string& peer) {

@@ -71,6 +71,7 @@ struct Message {
   Kind kind = Kind::ping;
   std::uint64_t sequence = 0;  ///< a request's number; its answer carries the same
   Body body = Body::object();
+  std::vector<std::pair<std::string, double>> values;  ///< the body's "values" in `advanced` and `done`, out of its tree since they are many
   std::vector<Array> arrays;
 
   /// @return the array of that name on that mesh, or nullptr

@@ -95,7 +95,7 @@ class Session::Line {
   void fail(const std::string& text, bool mistake) noexcept {
     if (std::exchange(coupler_knows_, true)) return;
     try {
-      channel_.send(error_message(text, state_, false, mistake));
+      channel_.send(error_message(text, state(), false, mistake));
     } catch (const std::exception&) {  // nobody listens any more
     }
   }
@@ -143,9 +143,14 @@ class Session::Line {
       if (known != points_.end() && field.values.size() != known->second)
         throw ProtocolError(fmt::format("{} on {} came with {} values for {} points", field.name, field.surface, field.values.size(), known->second));
     }
-    state_ = fmt::format("advancing from {:.6g} s to {:.6g} s", run_.time(asked.start), run_.time(asked.end));
-    window = {asked.start, asked.end, run_.time(asked.start), run_.time(asked.end - asked.start), asked.estimate};
+    window = window_ = {asked.start, asked.end, run_.time(asked.start), run_.time(asked.end - asked.start), asked.estimate};
+    state_ = "advancing";
     received_ = std::move(asked.fields);
+  }
+
+  // Put into words when somebody asks: windows are many.
+  std::string state() const {
+    return state_ == "advancing" ? fmt::format("advancing from {:.6g} s to {:.6g} s", window_.start_time, window_.end_time()) : std::string(state_);
   }
 
   // What comes between windows.
@@ -166,7 +171,7 @@ class Session::Line {
         default: out_of_turn(request);
       }
     } catch (const Unsupported& error) {  // the coupler decides what that means; this solver goes on
-      return answer(error_message(error.what(), state_, true));
+      return answer(error_message(error.what(), state(), true));
     }
     answer(done_message());
   }
@@ -178,7 +183,7 @@ class Session::Line {
   }
 
   [[noreturn]] void out_of_turn(const Message& message) const {
-    throw ProtocolError(fmt::format("the coupler sent {} to {} while it was {}", name_of(message.kind), options_.name, state_));
+    throw ProtocolError(fmt::format("the coupler sent {} to {} while it was {}", name_of(message.kind), options_.name, state()));
   }
 
   const ServeOptions options_;
@@ -192,7 +197,8 @@ class Session::Line {
   std::map<std::string, std::size_t> points_;  // of the surfaces that were offered
   std::vector<Field> received_;
   std::uint64_t sequence_ = 0;  // of the request that is under way
-  std::string state_ = "connected";
+  std::string_view state_ = "connected";
+  Window window_{};  // the last that was asked for
   bool shares_memory_ = false;  // with the coupler
   bool coupler_knows_ = false;  // that it is over
 };

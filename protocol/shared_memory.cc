@@ -61,19 +61,23 @@ bool SharedMemory::map(std::size_t bytes) {
   return true;
 }
 
+// What is mapped is there, as it cannot shrink: only beyond it the system is asked.
 std::byte* SharedMemory::room(std::size_t bytes) {
   if (bytes > most) return nullptr;
   const std::size_t wanted = (arrays_begin + bytes + page - 1) / page * page;
-  // Pages are asked for before they are touched: a machine that has none says so here, where frames can still be sent instead.
-  if (wanted > size_of(descriptor_) && ::posix_fallocate(descriptor_, 0, static_cast<off_t>(wanted)) != 0) return nullptr;
-  if (wanted > mapped_ && !map(wanted)) return nullptr;
+  if (wanted > mapped_) {
+    // Pages are asked for before they are touched: a machine that has none says so here, where frames can still be sent instead.
+    if (wanted > size_of(descriptor_) && ::posix_fallocate(descriptor_, 0, static_cast<off_t>(wanted)) != 0) return nullptr;
+    if (!map(wanted)) return nullptr;
+  }
   return memory_ + arrays_begin;
 }
 
-std::span<const std::byte> SharedMemory::contents() {
-  const auto size = size_of(descriptor_);
-  if (size > mapped_ && !map(size)) throw ProtocolError("shared memory cannot be mapped: there is no more address space");
-  return {memory_, size};
+std::span<const std::byte> SharedMemory::contents(std::uint64_t bytes) {
+  if (bytes > mapped_)
+    if (const auto size = size_of(descriptor_); size > mapped_ && !map(size))
+      throw ProtocolError("shared memory cannot be mapped: there is no more address space");
+  return {memory_, mapped_};
 }
 
 MemoryPair MemoryPair::create() {

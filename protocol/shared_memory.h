@@ -32,8 +32,9 @@ class SharedMemory {
 
   /// `bytes` that may be written, from `arrays_begin` on; nullptr for more than `most`, or than the system has. What lay there is overwritten.
   std::byte* room(std::size_t bytes);
-  /// All of it, as the other side has written it; in place until the next call. @throws ProtocolError when it cannot be mapped
-  std::span<const std::byte> contents();
+  /// So many of its bytes or more, as the other side has written them, or all where there are fewer; in place until the next call.
+  /// @throws ProtocolError when they cannot be mapped
+  std::span<const std::byte> contents(std::uint64_t bytes);
 
  private:
   explicit SharedMemory(int descriptor) : descriptor_(descriptor) {}

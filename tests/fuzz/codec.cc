@@ -56,9 +56,6 @@ void read_body(const Message& message) {
     case Kind::advanced:
       read_advanced(message);
       break;
-    case Kind::done:
-      read_values(message.body);
-      break;
     default:
       read_error(message);
       break;

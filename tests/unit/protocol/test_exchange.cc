@@ -152,7 +152,7 @@ TEST(Exchange, ValuesKeepTheirOrder) {
   const auto read = read_advanced(trip(advanced_message(advance)));
   EXPECT_EQ(read.quantities, advance.quantities);
   EXPECT_EQ(read.steps, advance.steps);
-  EXPECT_EQ(read_values(trip(done_message({{"seconds", 2.5}})).body).front().second, 2.5);
+  EXPECT_EQ(trip(done_message({{"seconds", 2.5}})).values.front().second, 2.5);
 }
 
 TEST(Exchange, WhatIsNotFiniteIsNamed) {

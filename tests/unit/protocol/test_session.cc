@@ -104,7 +104,7 @@ TEST_F(Session, AnswersRequestsWithTheirNumbersUntilFinish) {
   const auto done = hear();
   EXPECT_EQ(done.kind, Kind::done);
   EXPECT_EQ(done.sequence, 78u);
-  EXPECT_EQ(read_values(done.body).back().first, "peak_bytes");
+  EXPECT_EQ(done.values.back().first, "peak_bytes");
   end();
   EXPECT_TRUE(ended_well_);
 }
