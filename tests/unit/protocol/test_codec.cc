@@ -83,6 +83,38 @@ TEST(Codec, ArraysAreReadInPlaceWhereAlignedAndCopiedWhereNot) {
   }
 }
 
+TEST(Codec, ValuesOfAnswersAreReadApartAndChecked) {
+  auto sent = sample(Kind::advanced);
+  sent.values = {{"weight", 2.5}, {"a name that is longer than a short string", -1}, {"weight", std::numeric_limits<double>::infinity()}};
+  const auto read = decode(frames_of(sent));
+  EXPECT_EQ(read.values, sent.values);
+  EXPECT_EQ(read.body, sent.body);
+  EXPECT_EQ(Body::from_msgpack(encode_header(sent))["body"]["values"][1][0], "a name that is longer than a short string");
+
+  const auto with = [](const char* kind, const char* values) {
+    auto header = plain_header();
+    header["kind"] = kind;
+    header["body"]["values"] = Body::parse(values);
+    return std::vector{header_of(header)};
+  };
+  EXPECT_EQ(decode(with("done", R"([["steps", 3], ["least", -2], ["half", 0.5]])")).values.at(1).second, -2);
+  EXPECT_TRUE(decode(with("done", "[]")).values.empty());
+  EXPECT_EQ(decode(with("hello", "7")).body["values"], 7) << "means something there, in another release";
+  for (const auto* wrong : {"7", "{}", R"([["name", "text"]])", "[[1, 2]]", R"([["name", 1, 2]])", R"(["name", 1])", R"([["name", null]])"})
+    expect_refused(with("advanced", wrong), "\"values\" is not a list of [name, number]");
+  using namespace std::string_literals;
+  expect_refused({frame("\x85\xa6" "acopla\x01\xa4kind\xa4" "done\xa8sequence\x00\xa4" "body\x82\xa6values\x90\xa6values\x90\xa6" "arrays\x90"s)}, "names \"values\" twice");
+}
+
+TEST(Codec, WhatALaterReleaseAddsIsPassedOverOnceItIsWellFormed) {
+  auto header = plain_header();
+  header["priority"] = {{"of", {1, 2}}};
+  header["arrays"] = {{{"name", "force"}, {"mesh", "box"}, {"type", "f8"}, {"shape", {0}}, {"unit", "N"}}};
+  EXPECT_EQ(decode(std::vector{header_of(header), frame("")}).arrays.size(), 1u);
+  header["priority"] = Body::array({"\xff"});
+  expect_refused({header_of(header), frame("")}, "not UTF-8");
+}
+
 TEST(Codec, AnArrayOutlivesItsMessageAndFrames) {
   Array kept;
   { kept = decode(frames_of(sample(Kind::advanced))).arrays[0]; }

@@ -97,6 +97,24 @@ TEST(SharedMemory, ArraysAreReadWhereTheHeaderSaysAndNowhereElse) {
   EXPECT_THROW(decode(std::vector{frame(encode_header(message, std::vector{begin + 8})), frame("surplus")}, {}, memory.get()), ProtocolError);
 }
 
+// The reader's view of the memory moves when it grows: all arrays of a message must lie in the same one.
+TEST(SharedMemory, SeveralArraysOfAMemoryThatGrewAreReadFromOnePlace) {
+  const auto ours = SharedMemory::create(token);
+  const auto theirs = SharedMemory::open(ours->path(), token);
+  ASSERT_TRUE(theirs);
+  for (std::size_t count = 100; count <= 1'000'000; count *= 10) {
+    auto message = message_with(std::vector<double>(count, 1));
+    message.arrays.push_back(message_with(std::vector<double>(count, 2)).arrays[0]);
+    const std::vector<std::uint64_t> at{SharedMemory::arrays_begin, SharedMemory::arrays_begin + 8 * count};
+    auto* room = ours->room(16 * count);
+    ASSERT_TRUE(room);
+    for (std::size_t k = 0; k < 2; ++k) std::memcpy(room + 8 * count * k, message.arrays[k].bytes().data(), 8 * count);
+    const auto read = decode(std::vector{frame(encode_header(message, at))}, {}, theirs.get());
+    EXPECT_EQ(read.arrays[0].doubles()[count - 1], 1);
+    EXPECT_EQ(read.arrays[1].doubles()[count - 1], 2);
+  }
+}
+
 TEST(SharedMemory, LongArraysOfAConnectionGoThroughItOnceItIsFound) {
   zmq::context_t context;
   const auto endpoint = fmt::format("ipc:///tmp/acopla-memory-{}", ::getpid());
