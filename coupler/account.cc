@@ -17,7 +17,7 @@ Account::Account(const Case& read, Crew& crew, Record& record, Quantities& quant
                  Reporter& reporter)
     : case_(read), crew_(crew), record_(record), quantities_(quantities), reporter_(reporter) {
   for (const auto& interface : case_.interfaces) link(interface);
-  share();
+  for (std::size_t k = 0; k < links_.size(); ++k) share(k);
   for (auto& link : links_) {
     if (link.to) map(link);
     link.centre = link.from->centroid();
@@ -31,7 +31,6 @@ void Account::link(const InterfaceCase& interface) {
   link.from = &crew_.surface(interface.from, interface.from_at);
   if (interface.recorded_only()) {
     record_.add_surface(interface.from.text(), *link.from);
-    record_.set_mapping(links_.size(), 0, 0);
     interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
     links_.push_back(std::move(link));
     return;
@@ -45,28 +44,28 @@ void Account::link(const InterfaceCase& interface) {
                                                        interface.from.text(), interface.to.text()));
   record_.add_surface(interface.from.text(), *link.from);
   record_.add_surface(interface.to.text(), *link.to);
+  if (interface.moving != Moving::together) {
+    const auto& initial = crew_.initial(interface.from).displacement;
+    link.travel = std::make_unique<Travel>(interface, *link.from, case_.dimension, initial);
+    record_.set_initial(interface.from.text(), initial.empty() ? std::vector<Vec3>(link.from->points.size(), Vec3::Zero()) : initial, {});
+  }
   interfaces_.push_back({interface.text(), Vec3::Zero(), Vec3::Zero(), 0, 0});
   links_.push_back(std::move(link));
 }
 
-// Interfaces of one table share the points of the surface they come from.
-void Account::share() {
-  for (std::size_t first = 0; first < links_.size();) {
-    std::vector<const geometry::SurfaceMesh*> receivers;
-    auto last = first;
-    while (last < links_.size() && links_[last].about->share != 0 && links_[last].about->share == links_[first].about->share) receivers.push_back(links_[last++].to);
-    if (receivers.empty()) {
-      ++first;
-      continue;
-    }
-    auto shares = share_points(*links_[first].from, receivers, case_.max_distance);
-    for (auto& own : shares) links_[first++].own = std::move(own);
-  }
+// Interfaces of one table share the points of the surface they come from: all of them at the first.
+void Account::share(std::size_t first) {
+  const auto group = links_[first].about->share;
+  if (group == 0 || (first > 0 && links_[first - 1].about->share == group)) return;
+  std::vector<const geometry::SurfaceMesh*> receivers;
+  for (auto k = first; k < links_.size() && links_[k].about->share == group; ++k) receivers.push_back(links_[k].to);
+  for (auto& own : share_points(links_[first].place(), receivers, case_.max_distance)) links_[first++].own = std::move(own);
 }
 
 void Account::map(Link& link) {
   const auto& interface = *link.about;
-  link.mapping = std::make_unique<Mapping>(*link.from, *link.to, MappingOptions{case_.max_distance, interface.mapping, link.own});
+  link.mapping = std::make_unique<Mapping>(link.place(), *link.to, MappingOptions{case_.max_distance, interface.mapping, link.own});
+  if (interface.moving == Moving::past) return;  // it may begin beside the receiver, and leave it: the ledger has what is lost
   const auto& mapping = *link.mapping;
   if (static_cast<std::int64_t>(mapping.unmapped()) > case_.limits.unmapped) {
     const auto& point = link.from->points[mapping.unmapped_points().front()];
@@ -80,21 +79,46 @@ void Account::map(Link& link) {
                     mapping.unmapped(), link.from->points.size(), interface.from.text(),
                     case_.max_distance, interface.to.text(), point[0], point[1], point[2]));
   }
-  ledgers_.unmapped += static_cast<std::int64_t>(mapping.unmapped());
-  ledgers_.worst_distance = std::max(ledgers_.worst_distance, mapping.worst_distance());
   if (mapping.uncovered() > 0)
     reporter_.note(fmt::format("{}: {} of {} points of {} have no face of {} over those around them, and load the nearest.", interface.at.text(), mapping.uncovered(),
                                link.from->points.size(), interface.from.text(), interface.to.text()));
-  record_.set_mapping(static_cast<std::size_t>(&link - links_.data()), mapping.unmapped(), mapping.worst_distance());
 }
 
-void Account::map_forces(const std::string& sender, protocol::Advance& advance, WindowRecord& window, Forces& received) const {
+// Only interfaces that say so are followed; while a surface stands its mapping stays.
+void Account::follow(const std::string& sender, protocol::Advance& advance, WindowRecord& window) {
+  const auto follows = [&](const Link& link) { return link.travel && link.about->from.participant == sender; };
+  for (auto& link : links_) {
+    if (!follows(link)) continue;
+    auto& displacement = window.motion[link.about->from.text()].displacement;
+    for (auto& field : advance.fields)
+      if (field.name == "displacement" && field.surface == link.about->from.surface && displacement.empty()) displacement = std::move(field.values);
+    link.travel->go_on(displacement);
+  }
+  const auto is_elsewhere = [&](const Link& link) { return follows(link) && link.about->moving == Moving::past && link.travel->has_moved(); };
+  for (std::size_t k = 0; k < links_.size(); ++k)
+    if (is_elsewhere(links_[k])) share(k);
+  for (auto& link : links_)
+    if (is_elsewhere(link)) map(link);
+}
+
+std::vector<Vec3> Link::carried(std::span<const Vec3> forces) const {
+  auto all = travel && about->moving == Moving::frame ? travel->in_own_axes(forces) : std::vector<Vec3>(forces.begin(), forces.end());
+  for (std::size_t k = 0; k < own.size(); ++k)
+    if (!own[k]) all[k].setZero();
+  return all;
+}
+
+void Account::map_forces(const std::string& sender, protocol::Advance& advance, WindowRecord& window, Forces& received) {
+  follow(sender, advance, window);
   for (auto& field : advance.fields)
     if (field.name == "force") window.forces[sender + "." + field.surface] = std::move(field.values);
   for (std::size_t k = 0; k < links_.size(); ++k) {
     const auto& link = links_[k];
     if (!link.mapping || link.about->from.participant != sender) continue;
-    const auto& sent = window.forces.at(link.about->from.text());
+    const bool turns = link.about->moving == Moving::frame;
+    const auto& raw = window.forces.at(link.about->from.text());
+    const auto turned = turns ? link.carried(raw) : std::vector<Vec3>();
+    const auto& sent = turns ? turned : raw;
     auto& load = received[link.about->to.text()];
     if (link.alone) {
       load.resize(link.to->points.size());
@@ -114,18 +138,6 @@ const std::vector<Vec3>& Account::arrived(std::size_t interface, const WindowRec
   return links_[interface].alone ? received.at(links_[interface].about->to.text()) : window.arrived[interface];
 }
 
-namespace {
-
-/// What of a surface's forces an interface carries.
-std::vector<Vec3> own_forces(const Link& link, const std::vector<Vec3>& forces) {
-  auto own = forces;
-  for (std::size_t k = 0; k < own.size(); ++k)
-    if (!link.own[k]) own[k].setZero();
-  return own;
-}
-
-}  // namespace
-
 void Account::balance(const std::string& sender, WindowRecord& window, const Forces& received) const {
   window.ledger.resize(links_.size());
   for (std::size_t k = 0; k < links_.size(); ++k) {
@@ -133,9 +145,14 @@ void Account::balance(const std::string& sender, WindowRecord& window, const For
     if (link.about->from.participant != sender) continue;
     auto& row = window.ledger[k];
     const auto& forces = window.forces.at(link.about->from.text());
-    row.sent = link.own.empty() ? resultant(link.from->points, forces, link.centre) : resultant(link.from->points, own_forces(link, forces), link.centre);
-    row.received = link.mapping ? resultant(link.to->points, arrived(k, window, received), link.centre) : row.sent;
-    if (link.mapping) row.loss = loss(row.sent, row.received);
+    const bool all_as_they_are = link.own.empty() && link.about->moving != Moving::frame;
+    row.sent = resultant(link.place().points, all_as_they_are ? forces : link.carried(forces), link.centre);
+    row.received = row.sent;
+    if (!link.mapping) continue;
+    row.received = resultant(link.to->points, arrived(k, window, received), link.centre);
+    row.loss = loss(row.sent, row.received);
+    row.unmapped = link.mapping->unmapped();
+    row.worst_distance = link.mapping->worst_distance();
   }
 }
 
@@ -143,8 +160,11 @@ void Account::begin() { begin_ = std::chrono::steady_clock::now(); }
 
 void Account::close(WindowRecord& window) {
   window.ledger.resize(links_.size());
+  std::int64_t unmapped = 0;
   for (std::size_t k = 0; k < links_.size(); ++k) {
     const auto& row = window.ledger[k];
+    unmapped += static_cast<std::int64_t>(row.unmapped);
+    ledgers_.worst_distance = std::max(ledgers_.worst_distance, row.worst_distance);
     auto& outcome = interfaces_[k];
     outcome.sent = row.sent.force;
     outcome.received = row.received.force;
@@ -154,6 +174,7 @@ void Account::close(WindowRecord& window) {
     ledgers_.moment_loss = std::max(ledgers_.moment_loss, row.loss.moment);
     ledgers_.energy_made += row.work_received - row.work_sent;
   }
+  ledgers_.unmapped = std::max(ledgers_.unmapped, unmapped);
   ledgers_.iterations += window.iterations;
   ledgers_.most_iterations = std::max(ledgers_.most_iterations, window.iterations);
   ledgers_.not_converged += window.converged ? 0 : 1;

@@ -14,6 +14,7 @@
 #include "coupler/quantities.h"
 #include "coupler/record.h"
 #include "coupler/reporter.h"
+#include "coupler/travel.h"
 
 namespace acopla::coupler {
 
@@ -22,9 +23,14 @@ struct Link {
   const InterfaceCase* about = nullptr;
   const geometry::SurfaceMesh *from = nullptr, *to = nullptr;  ///< to, mapping: null where the forces are recorded only
   std::unique_ptr<Mapping> mapping;
+  std::unique_ptr<Travel> travel;  ///< null unless the interface follows `from`
   std::vector<char> own;  ///< of the points of `from`, where several interfaces share them; else empty
   geometry::Vec3 centre = geometry::Vec3::Zero();  ///< of `from`, about which moments are taken [m]
   bool alone = true;                               ///< no other interface ends on `to`
+  /// `from`, where forces on it meet `to`.
+  const geometry::SurfaceMesh& place() const { return travel && about->moving == Moving::past ? travel->midway() : *from; }
+  /// The forces that the interface carries of those on `from`, one per point: in the axes of `to`, without those of points that belong to others [N].
+  std::vector<geometry::Vec3> carried(std::span<const geometry::Vec3> forces) const;
 };
 
 /// What every scheme keeps: it builds the mappings, and books each window once everybody is through it.
@@ -36,8 +42,9 @@ class Account {
   const std::vector<Link>& links() const { return links_; }
   using Forces = std::map<std::string, std::vector<geometry::Vec3>>;  // surface → one force per point [N]
 
-  /// Maps what `sender` sent in a window, which goes into the record, onto the surfaces that receive it, which grow by it.
-  void map_forces(const std::string& sender, protocol::Advance& advance, WindowRecord& window, Forces& received) const;
+  /// Maps what `sender` sent in a window, which goes into the record, onto the surfaces that receive it, which grow by it. Windows must come in
+  /// their order. @throws Failure where a surface cannot be followed
+  void map_forces(const std::string& sender, protocol::Advance& advance, WindowRecord& window, Forces& received);
   /// Enters in the ledger what went through the interfaces from `sender`, once all its forces are mapped: nobody need wait for it.
   void balance(const std::string& sender, WindowRecord& window, const Forces& received) const;
   /// The part of what arrived on a surface that came through one interface.
@@ -56,6 +63,8 @@ class Account {
     archive("ledgers", ledgers_);
     for (auto& interface : interfaces_) archive("worst_loss." + interface.name, interface.worst_loss);
     archive("quantities", quantities_);
+    for (std::size_t k = 0; k < links_.size(); ++k)
+      if (links_[k].travel) archive("travel." + std::to_string(k), *links_[k].travel);
   }
   /// Writes the next window, and compares it with the limits. @throws Failure beyond one
   void close(WindowRecord& window);
@@ -68,7 +77,8 @@ class Account {
 
  private:
   void link(const InterfaceCase& interface);
-  void share();
+  void follow(const std::string& sender, protocol::Advance& advance, WindowRecord& window);
+  void share(std::size_t first);
   void map(Link& link);
   void check_limits(const WindowRecord& window) const;
 

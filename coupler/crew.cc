@@ -470,7 +470,10 @@ std::vector<protocol::Run::Use> uses_of(const Case& read, const std::string& par
     const bool moves = read.scheme != SchemeKind::one_way && !interface.recorded_only();
     if (interface.from.participant == participant) {
       auto& from = use(interface.from.surface);
+      const bool is_followed = interface.moving != Moving::together ||
+                               std::find(from.sends.begin(), from.sends.end(), "displacement") != from.sends.end();
       from.sends = {"force"};
+      if (is_followed) from.sends.push_back("displacement");
       if (moves) from.receives = {"displacement", "velocity"};
       if (moves && read.scheme == SchemeKind::serial_implicit)
         from.receives.insert(from.receives.end(), {"end_displacement", "end_velocity"});

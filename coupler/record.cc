@@ -10,7 +10,7 @@ namespace acopla::coupler {
 using geometry::Vec3;
 
 Record::Record(const Case& read, const std::string& folder, std::int64_t rows, std::int64_t resumes_after)
-    : case_(read), folder_(folder), resumes_after_(resumes_after), mapping_(read.interfaces.size(), {0, 0.0}) {
+    : case_(read), folder_(folder), resumes_after_(resumes_after) {
   if (folder_.empty()) return;
   std::filesystem::create_directories(folder_ + "/surfaces");
   const auto file = folder_ + "/interface.h5";
@@ -28,11 +28,7 @@ void Record::add_surface(const std::string& name, const geometry::SurfaceMesh& m
 void Record::set_initial(const std::string& surface, std::span<const Vec3> displacement, std::span<const Vec3> velocity) {
   if (!series_) return;
   series_->add_initial(surface, "displacement", displacement);
-  series_->add_initial(surface, "velocity", velocity);
-}
-
-void Record::set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance) {
-  mapping_[interface] = {unmapped, worst_distance};
+  if (!velocity.empty()) series_->add_initial(surface, "velocity", velocity);
 }
 
 Record::~Record() {
@@ -48,7 +44,7 @@ void Record::write(std::int64_t index, const WindowRecord& window) {
   constexpr std::size_t most_values = 8u << 20;  // 192 MiB
   pending_.emplace_back(index, window);
   for (const auto& [name, force] : window.forces) pending_values_ += force.size();
-  for (const auto& [name, motion] : window.motion) pending_values_ += 2 * motion.displacement.size();
+  for (const auto& [name, motion] : window.motion) pending_values_ += motion.displacement.size() + motion.velocity.size();
   if (index + window.ticks < case_.windows && pending_values_ < most_values && std::chrono::steady_clock::now() - written_ < pause) return;
   write_pending();
 }
@@ -67,7 +63,7 @@ void Record::append(std::int64_t index, const WindowRecord& window) {
   for (const auto& [name, force] : window.forces) series_->add_field(name, "force", force);
   for (const auto& [name, motion] : window.motion) {
     series_->add_field(name, "displacement", motion.displacement);
-    series_->add_field(name, "velocity", motion.velocity);
+    if (!motion.velocity.empty()) series_->add_field(name, "velocity", motion.velocity);
   }
   for (const auto& [name, value] : window.quantities)
     series_->add_scalar("quantities/" + name, value);
@@ -99,8 +95,8 @@ void Record::write_ledger(const WindowRecord& window) {
     }
     force_loss = std::max(force_loss, row.loss.force);
     moment_loss = std::max(moment_loss, row.loss.moment);
-    unmapped += mapping_[k].first;
-    worst_distance = std::max(worst_distance, mapping_[k].second);
+    unmapped += row.unmapped;
+    worst_distance = std::max(worst_distance, row.worst_distance);
   }
   series_->add_scalar("ledger/force_loss", force_loss);
   series_->add_scalar("ledger/moment_loss", moment_loss);

@@ -22,6 +22,8 @@ namespace acopla::coupler {
 struct LedgerRow {
   Resultant sent, received;  ///< about the centroid of the sending surface
   Loss loss;
+  std::size_t unmapped = 0;   ///< points without a partner
+  double worst_distance = 0;  ///< of a point from its partner [m]
   /// Two-way: of the forces on the nodes that receive them, over the way the structure went, and over that of the surface that sent
   /// them [J].
   double work_received = 0, work_sent = 0;
@@ -37,7 +39,8 @@ struct WindowRecord {
   struct Motion {
     std::vector<geometry::Vec3> displacement, velocity;
   };
-  std::map<std::string, Motion> motion;  ///< of the surfaces that answer, at the window's end [m], [m/s]; where it is asked for
+  /// At the window's end [m], [m/s]: of the surfaces that answer, where it is asked for, and, without velocity, of those that interfaces follow.
+  std::map<std::string, Motion> motion;
   std::int64_t iterations = 0;  ///< implicit
   double residual = 0;          ///< implicit: of the motion, over that of the window
   bool converged = true;
@@ -51,10 +54,8 @@ class Record {
   /// @param rows, resumes_after  windows that a run before has written there and that stay, and their ticks
   Record(const Case& read, const std::string& folder, std::int64_t rows = 0, std::int64_t resumes_after = 0);
   void add_surface(const std::string& name, const geometry::SurfaceMesh& mesh);
-  /// How a surface that answers begins.
+  /// How a surface begins whose motion is recorded. @param velocity  empty where it is not
   void set_initial(const std::string& surface, std::span<const geometry::Vec3> displacement, std::span<const geometry::Vec3> velocity);
-  /// What does not change: points without a partner, the farthest of those with one.
-  void set_mapping(std::size_t interface, std::size_t unmapped, double worst_distance);
   ~Record();
   Record(const Record&) = delete;
   Record& operator=(const Record&) = delete;
@@ -76,7 +77,6 @@ class Record {
   std::unique_ptr<io::SeriesWriter> series_;
   std::map<std::string, geometry::SurfaceMesh> surfaces_;
   std::map<std::string, io::PvdSeries> pictures_;
-  std::vector<std::pair<std::size_t, double>> mapping_;  // per interface
   std::vector<std::pair<std::int64_t, WindowRecord>> pending_;
   std::size_t pending_values_ = 0;
   std::chrono::steady_clock::time_point written_{};

@@ -66,13 +66,15 @@ std::vector<protocol::Surface> Replay::start(const protocol::Run& run) {
                                       fmt::join(recorded, ", ")));
     const auto sends = [&](const char* field) { return std::find(use.sends.begin(), use.sends.end(), field) != use.sends.end(); };
     surfaces_.push_back({use.surface, reader_.surface(full)});
-    played_.push_back({use.surface, sends("force"), sends("displacement")});
+    played_.push_back({use.surface, sends("force"), sends("displacement"), sends("velocity")});
+    const bool speeds = played_.back().speeds;
     if (!played_.back().moves) continue;
     if (!reader_.has(full, "displacement"))
-      throw io::UserError({replay_.file, 0, 0}, fmt::format("the record holds no motion of {}. Run the case that makes it with coupling.record_motion = true.", full));
+      throw io::UserError({replay_.file, 0, 0}, fmt::format("the record holds no motion of {}. Run the case that makes it with coupling.record_motion = true, or, of a surface that moves by "
+                                                           "itself, with `moving` in its interface.", full));
     const double start = from_ - replay_.at;
     surfaces_.back().displacement = motion(use.surface, "displacement", start);
-    surfaces_.back().velocity = motion(use.surface, "velocity", start);
+    if (speeds) surfaces_.back().velocity = motion(use.surface, "velocity", start);
   }
   return surfaces_;
 }
@@ -83,8 +85,8 @@ protocol::Advance Replay::advance(const protocol::Window& window,
   protocol::Advance advance;
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
     const auto& surface = surfaces_[k];
-    if (played_[k].moves)
-      for (const char* field : {"displacement", "velocity"}) advance.fields.push_back({surface.name, field, motion(surface.name, field, window.end_time() + shift)});
+    for (const auto& [field, is_sent] : {std::pair{"displacement", played_[k].moves}, {"velocity", played_[k].speeds}})
+      if (is_sent) advance.fields.push_back({surface.name, field, motion(surface.name, field, window.end_time() + shift)});
     if (!played_[k].sends) continue;
     auto force = mean_force(surface.name, surface.mesh.points.size(), window.start_time + shift,
                             window.end_time() + shift);

@@ -36,7 +36,7 @@ class Replay final : public protocol::Participant {
 
   struct Played {
     std::string surface;
-    bool sends = false, moves = false;
+    bool sends = false, moves = false, speeds = false;
   };
   ReplayCase replay_;
   std::string name_;

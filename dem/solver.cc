@@ -37,8 +37,11 @@ void Solver::check_uses(const protocol::Run& run) {
   for (const auto& use : run.uses) {
     const auto wall = wall_of(use.surface);
     for (const auto& field : use.sends)
-      if (field != "force") throw io::UserError(fmt::format("{}.{} cannot send {}: it sends force.", scene_.name, use.surface, field));
-    if (!use.sends.empty()) sent_.push_back(wall);
+      if (field != "force" && field != "displacement")
+        throw io::UserError(fmt::format("{}.{} cannot send {}: it sends force and displacement.", scene_.name, use.surface, field));
+    const auto sends = [&](const char* field) { return std::find(use.sends.begin(), use.sends.end(), field) != use.sends.end(); };
+    if (sends("force")) sent_.push_back(wall);
+    if (sends("displacement")) followed_.push_back(wall);
     if (use.receives.empty()) continue;
     for (const auto& field : use.receives)
       if (field != "displacement" && field != "velocity" && field != "end_displacement" && field != "end_velocity")
@@ -64,10 +67,16 @@ std::vector<protocol::Surface> Solver::start(const protocol::Run& run) {
   // Forces on vertices are summed only for walls that somebody wants them of.
   for (const auto wall : sent_) walls.send(wall);
   std::vector<protocol::Surface> surfaces;
-  for (const auto& use : run.uses) surfaces.push_back({use.surface, walls.surface(wall_of(use.surface))});
+  for (const auto& use : run.uses) surfaces.push_back({use.surface, walls.surface(wall_of(use.surface)), {}, {}, {}});
+  for (const auto wall : followed_) places_.push_back(walls.surface(wall).points);
   open_pictures();
   if (run.resumes) resuming_ = std::move(walls);
   else begin(std::move(walls));
+  // In a state that a scene goes on from walls have moved already.
+  if (!run.resumes)
+    for (std::size_t k = 0; k < followed_.size(); ++k)
+      for (auto& surface : surfaces)
+        if (surface.name == scene_.walls[followed_[k]].name) surface.displacement = displacement(k);
   return surfaces;
 }
 
@@ -150,6 +159,7 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
   protocol::Advance result;
   result.steps = steps;
   for (const auto wall : sent_) result.fields.push_back({scene_.walls[wall].name, "force", load_.vertex_force[wall]});
+  for (std::size_t k = 0; k < followed_.size(); ++k) result.fields.push_back({scene_.walls[followed_[k]].name, "displacement", displacement(k)});
   if (window.estimate)
     for (const auto wall : received_)
       if (std::find(sent_.begin(), sent_.end(), wall) != sent_.end()) {
@@ -164,6 +174,13 @@ protocol::Advance Solver::advance(const protocol::Window& window, const std::vec
   last_rate_ = static_cast<double>(engine_->particles().size()) * static_cast<double>(steps) / seconds;
   write_output(window);
   return result;
+}
+
+/// How far a followed wall has moved from where the case puts it.
+std::vector<Vec3> Solver::displacement(std::size_t followed) const {
+  auto moved = engine_->walls().positions(followed_[followed]);
+  for (std::size_t v = 0; v < moved.size(); ++v) moved[v] -= places_[followed][v];
+  return moved;
 }
 
 void Solver::prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received) {

@@ -54,6 +54,7 @@ class Solver final : public protocol::Participant {
   void settle(Engine& engine) const;
   Particles settled_between_standing_walls(Particles particles) const;
   void prescribe(const protocol::Window& window, const std::vector<protocol::Field>& received);
+  std::vector<geometry::Vec3> displacement(std::size_t followed) const;
   void step_through(std::uint64_t steps, double step);
   std::vector<std::pair<std::string, double>> quantities(double step);
   void write_output(const protocol::Window& window);
@@ -66,7 +67,8 @@ class Solver final : public protocol::Participant {
   std::optional<WallSet> resuming_;  // between start() and resume()
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<Traffic> traffic_;
-  std::vector<std::size_t> sent_, received_;  // walls the coupling uses
+  std::vector<std::size_t> sent_, received_, followed_;  // walls the coupling uses
+  std::vector<std::vector<geometry::Vec3>> places_;      // of the vertices of those that are followed, as the case gives them [m]
   WallLoad load_;                             // mean over the window
   io::State saved_;
   protocol::Run run_;

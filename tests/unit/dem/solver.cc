@@ -52,6 +52,32 @@ double value(const std::vector<std::pair<std::string, double>>& values, const st
   return 0;
 }
 
+TEST(CoupledWall, SaysWhereItsOwnMotionHasBroughtIt) {
+  auto text = head + R"([g.wall.blade]
+line = [[0, 0], [1, 0], [1, 0.5]]
+material = "sand"
+motion = { kind = "rotation", rpm = 30, centre = [0.25, 0.1] }
+[[g.insert]]
+material = "sand"
+particles = [{ at = [5, 5], diameter = 0.1 }]
+)";
+  const auto solver = solver_of(text);
+  const auto surfaces = solver->start(run_of(Vec3(0, -9.81, 0), {{"blade", {}, {"force", "displacement"}}}));
+  ASSERT_EQ(surfaces.size(), 1u);
+  for (const auto& u : surfaces[0].displacement) EXPECT_EQ(u, Vec3(0, 0, 0)) << "it begins where the case puts it";
+  const Vec3 centre(0.25, 0.1, 0);
+  for (int k = 0; k < 30; ++k) {
+    const auto fields = solver->advance(window(k), {}).fields;
+    ASSERT_EQ(fields.size(), 2u);
+    EXPECT_EQ(fields[1].name, "displacement");
+    const Eigen::AngleAxisd turn(M_PI * 0.01 * (k + 1), Vec3::UnitZ());
+    for (std::size_t v = 0; v < surfaces[0].mesh.points.size(); ++v) {
+      const Vec3 expected = centre + turn * (surfaces[0].mesh.points[v] - centre) - surfaces[0].mesh.points[v];
+      EXPECT_LT((fields[1].values[v] - expected).norm(), 1e-12) << "window " << k << ", vertex " << v;
+    }
+  }
+}
+
 TEST(CoupledWall, ElasticBallBouncesOffAMovingSegmentAtTwiceItsSpeed) {
   // In the wall's frame the ball only turns round: v' = 2 V. The wall moves as a coupled solver says, window by window.
   auto text = head;
