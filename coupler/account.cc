@@ -44,7 +44,7 @@ void Account::link(const InterfaceCase& interface) {
                                                        interface.from.text(), interface.to.text()));
   record_.add_surface(interface.from.text(), *link.from);
   record_.add_surface(interface.to.text(), *link.to);
-  if (interface.moving != Moving::together) {
+  if (interface.slides) {
     const auto& initial = crew_.initial(interface.from).displacement;
     link.travel = std::make_unique<Travel>(interface, *link.from, case_.dimension, initial);
     record_.set_initial(interface.from.text(), initial.empty() ? std::vector<Vec3>(link.from->points.size(), Vec3::Zero()) : initial, {});
@@ -65,7 +65,7 @@ void Account::share(std::size_t first) {
 void Account::map(Link& link) {
   const auto& interface = *link.about;
   link.mapping = std::make_unique<Mapping>(link.place(), *link.to, MappingOptions{case_.max_distance, interface.mapping, link.own});
-  if (interface.moving == Moving::past) return;  // it may begin beside the receiver, and leave it: the ledger has what is lost
+  if (interface.slides) return;  // it may begin beside the receiver, and leave it: the ledger has what is lost
   const auto& mapping = *link.mapping;
   if (static_cast<std::int64_t>(mapping.unmapped()) > case_.limits.unmapped) {
     const auto& point = link.from->points[mapping.unmapped_points().front()];
@@ -84,7 +84,7 @@ void Account::map(Link& link) {
                                link.from->points.size(), interface.from.text(), interface.to.text()));
 }
 
-// Only interfaces that say so are followed; while a surface stands its mapping stays.
+// Only interfaces that slide are followed; while their surface stands its mapping stays.
 void Account::follow(const std::string& sender, protocol::Advance& advance, WindowRecord& window) {
   const auto follows = [&](const Link& link) { return link.travel && link.about->from.participant == sender; };
   for (auto& link : links_) {
@@ -94,7 +94,7 @@ void Account::follow(const std::string& sender, protocol::Advance& advance, Wind
       if (field.name == "displacement" && field.surface == link.about->from.surface && displacement.empty()) displacement = std::move(field.values);
     link.travel->go_on(displacement);
   }
-  const auto is_elsewhere = [&](const Link& link) { return follows(link) && link.about->moving == Moving::past && link.travel->has_moved(); };
+  const auto is_elsewhere = [&](const Link& link) { return follows(link) && link.travel->has_moved(); };
   for (std::size_t k = 0; k < links_.size(); ++k)
     if (is_elsewhere(links_[k])) share(k);
   for (auto& link : links_)
@@ -102,7 +102,7 @@ void Account::follow(const std::string& sender, protocol::Advance& advance, Wind
 }
 
 std::vector<Vec3> Link::carried(std::span<const Vec3> forces) const {
-  auto all = travel && about->moving == Moving::frame ? travel->in_own_axes(forces) : std::vector<Vec3>(forces.begin(), forces.end());
+  auto all = travel ? travel->turned(forces) : std::vector<Vec3>(forces.begin(), forces.end());
   for (std::size_t k = 0; k < own.size(); ++k)
     if (!own[k]) all[k].setZero();
   return all;
@@ -115,10 +115,9 @@ void Account::map_forces(const std::string& sender, protocol::Advance& advance, 
   for (std::size_t k = 0; k < links_.size(); ++k) {
     const auto& link = links_[k];
     if (!link.mapping || link.about->from.participant != sender) continue;
-    const bool turns = link.about->moving == Moving::frame;
-    const auto& raw = window.forces.at(link.about->from.text());
-    const auto turned = turns ? link.carried(raw) : std::vector<Vec3>();
-    const auto& sent = turns ? turned : raw;
+    const auto& own = window.forces.at(link.about->from.text());
+    const auto turned = link.travel ? link.travel->turned(own) : std::vector<Vec3>();
+    const auto& sent = link.travel ? turned : own;
     auto& load = received[link.about->to.text()];
     if (link.alone) {
       load.resize(link.to->points.size());
@@ -145,7 +144,7 @@ void Account::balance(const std::string& sender, WindowRecord& window, const For
     if (link.about->from.participant != sender) continue;
     auto& row = window.ledger[k];
     const auto& forces = window.forces.at(link.about->from.text());
-    const bool all_as_they_are = link.own.empty() && link.about->moving != Moving::frame;
+    const bool all_as_they_are = link.own.empty() && !link.travel;
     row.sent = resultant(link.place().points, all_as_they_are ? forces : link.carried(forces), link.centre);
     row.received = row.sent;
     if (!link.mapping) continue;

@@ -23,13 +23,13 @@ struct Link {
   const InterfaceCase* about = nullptr;
   const geometry::SurfaceMesh *from = nullptr, *to = nullptr;  ///< to, mapping: null where the forces are recorded only
   std::unique_ptr<Mapping> mapping;
-  std::unique_ptr<Travel> travel;  ///< null unless the interface follows `from`
+  std::unique_ptr<Travel> travel;  ///< of an interface that slides; else null
   std::vector<char> own;  ///< of the points of `from`, where several interfaces share them; else empty
   geometry::Vec3 centre = geometry::Vec3::Zero();  ///< of `from`, about which moments are taken [m]
   bool alone = true;                               ///< no other interface ends on `to`
   /// `from`, where forces on it meet `to`.
-  const geometry::SurfaceMesh& place() const { return travel && about->moving == Moving::past ? travel->midway() : *from; }
-  /// The forces that the interface carries of those on `from`, one per point: in the axes of `to`, without those of points that belong to others [N].
+  const geometry::SurfaceMesh& place() const { return travel ? travel->midway() : *from; }
+  /// The forces that the interface carries of those on `from`, one per point: as `from` has turned, without those of points that belong to others [N].
   std::vector<geometry::Vec3> carried(std::span<const geometry::Vec3> forces) const;
 };
 

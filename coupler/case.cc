@@ -133,17 +133,16 @@ std::vector<InterfaceCase> read_interface(const io::Table& table, Case& read) {
       {"conservative", MappingKind::conservative}, {"overlap", MappingKind::overlap}, {"nearest", MappingKind::nearest}};
   interface.mapping = mappings.at(table.choice("mapping", {"conservative", "overlap", "nearest"}, "conservative"));
   if (!table.has("to")) {
-    for (const char* key : {"mapping", "motion", "moving"})
+    for (const char* key : {"mapping", "motion", "slides"})
       if (table.has(key)) table.fail(key, "has a meaning for an interface with `to` only. Remove it.");
     return {interface};
   }
   if (table.has("motion") && read.scheme == SchemeKind::one_way)
     table.fail("motion", "has a meaning where surfaces move: with scheme = \"explicit\", \"parallel\" or \"implicit\". Remove it.");
   interface.consistent_motion = table.choice("motion", {"conjugate", "consistent"}, "conjugate") == "consistent";
-  if (table.has("moving") && read.scheme != SchemeKind::one_way)
-    table.fail("moving", "is for surfaces that move by themselves, with scheme = \"one-way\": in two-way coupling the structure moves them. Remove it.");
-  static const std::map<std::string, Moving> movings{{"together", Moving::together}, {"frame", Moving::frame}, {"past", Moving::past}};
-  interface.moving = movings.at(table.choice("moving", {"together", "frame", "past"}, "together"));
+  if (table.has("slides") && read.scheme != SchemeKind::one_way)
+    table.fail("slides", "is for surfaces that move by themselves, with scheme = \"one-way\": in two-way coupling the structure moves them. Remove it.");
+  interface.slides = table.flag("slides", false);
   if (table.is_text("to")) {
     interface.to = read_surface(table, "to", read);
     return {interface};

@@ -21,13 +21,6 @@ struct SurfaceName {
   bool operator==(const SurfaceName&) const = default;
 };
 
-/// One-way: what becomes of an interface while `from` moves by itself.
-enum class Moving {
-  together,  ///< each point keeps what it met in the meshes, each force its direction
-  frame,     ///< the receiver stands in the frame of `from`: forces are turned back as `from` has turned
-  past       ///< the receiver stands still: the mapping is made anew where `from` is
-};
-
 /// [[coupling.interface]]: forces go from one surface to another, or, without `to`, into the record
 /// alone.
 struct InterfaceCase {
@@ -35,7 +28,7 @@ struct InterfaceCase {
   io::Location at, from_at, to_at;
   MappingKind mapping = MappingKind::conservative;
   bool consistent_motion = false;  ///< two-way: the motion by Mapping::values, not by the transpose of the forces
-  Moving moving = Moving::together;
+  bool slides = false;  ///< one-way: `from` moves by itself along `to`, which stands, and the mapping is made anew in every window
   /// Interfaces of one table, whose `to` lists several surfaces: each point of `from` belongs to one of them. 0: not shared.
   std::size_t share = 0;
   bool recorded_only() const { return to.participant.empty(); }

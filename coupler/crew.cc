@@ -470,7 +470,7 @@ std::vector<protocol::Run::Use> uses_of(const Case& read, const std::string& par
     const bool moves = read.scheme != SchemeKind::one_way && !interface.recorded_only();
     if (interface.from.participant == participant) {
       auto& from = use(interface.from.surface);
-      const bool is_followed = interface.moving != Moving::together ||
+      const bool is_followed = interface.slides ||
                                std::find(from.sends.begin(), from.sends.end(), "displacement") != from.sends.end();
       from.sends = {"force"};
       if (is_followed) from.sends.push_back("displacement");

@@ -24,12 +24,12 @@ void Travel::go_on(std::span<const Vec3> displacement) {
     has_moved_ = has_moved_ || now != midway_.points[k];
     midway_.points[k] = now;
   }
-  if (interface_.moving == Moving::frame && has_moved_) {
+  if (has_moved_) {
     const auto start = turn_of(start_), end = turn_of(displacement);
-    constexpr double most = 1;  // the mean of a force that turns so far in the part's axes is short by a twenty-fourth
+    constexpr double most = 1;  // the mean of a force that turns so far is short by a twenty-fourth
     if (const double angle = start.angularDistance(end); angle > most)
       throw Failure(interface_.from.text(), "following its motion",
-                    fmt::format("{}: {} turns by {:.2f} radians in a window, and a mean force has no direction in its frame then. Shorten the window.", interface_.at.text(),
+                    fmt::format("{}: {} turns by {:.2f} radians in a window, and a mean force has no direction then. Shorten the window.", interface_.at.text(),
                                 interface_.from.text(), angle),
                     Failure::Cause::limit);
     turn_ = start.slerp(0.5, end);
@@ -37,11 +37,11 @@ void Travel::go_on(std::span<const Vec3> displacement) {
   start_.assign(displacement.begin(), displacement.end());
 }
 
-std::vector<Vec3> Travel::in_own_axes(std::span<const Vec3> forces) const {
-  const Eigen::Matrix3d back = turn_.conjugate().toRotationMatrix();
-  std::vector<Vec3> own(forces.begin(), forces.end());
-  for (auto& force : own) force = back * force;
-  return own;
+std::vector<Vec3> Travel::turned(std::span<const Vec3> forces) const {
+  const Eigen::Matrix3d turn = turn_.toRotationMatrix();
+  std::vector<Vec3> turned(forces.begin(), forces.end());
+  for (auto& force : turned) force = turn * force;
+  return turned;
 }
 
 // The rotation that brings the mesh nearest to where it is, in the sense of least squares (Kabsch 1976). In the plane a straight line of points is
@@ -71,7 +71,7 @@ Eigen::Quaterniond Travel::turn_of(std::span<const Vec3> displacement) const {
   constexpr double rigid_to = 1e-6;  // of its size
   if (!(worst <= rigid_to * surface_.extent()))
     throw Failure(interface_.from.text(), "following its motion",
-                  fmt::format("{}: {} deforms by {:.3g} m, so it has no frame of its own. moving = \"frame\" is for rigid surfaces.", interface_.at.text(),
+                  fmt::format("{}: {} deforms by {:.3g} m. slides = true is for rigid surfaces.", interface_.at.text(),
                               interface_.from.text(), worst),
                   Failure::Cause::limit);
   return Eigen::Quaterniond(turn).normalized();

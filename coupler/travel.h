@@ -1,4 +1,4 @@
-// A surface that moves by itself while it sends forces, in one-way coupling: its forces in its own frame, or its place beside what stands.
+// A surface that moves by itself along what stands, while it sends forces: where it is, and how it has turned.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,8 +12,8 @@
 
 namespace acopla::coupler {
 
-/// Follows one surface window by window. Forces are means over a window, and belong to the middle of its motion: both what is asked of here is
-/// of second order in the window.
+/// Follows one rigid surface window by window. Forces are means over a window and belong to the middle of its motion, so that places and directions
+/// are of second order in the window.
 class Travel {
  public:
   /// @param surface  where it stands in its mesh; must outlive this
@@ -21,15 +21,15 @@ class Travel {
   Travel(const InterfaceCase& interface, const geometry::SurfaceMesh& surface, int dimension, std::span<const geometry::Vec3> displacement);
 
   /// On by a window. @param displacement  at its end, one per point [m]
-  /// @throws Failure of moving = "frame" where the surface deforms, or turns by more than a radian
+  /// @throws Failure where the surface deforms, or turns by more than a radian
   void go_on(std::span<const geometry::Vec3> displacement);
 
   /// The surface in the middle of the window.
   const geometry::SurfaceMesh& midway() const { return midway_; }
   /// It is not where it was in the window before.
   bool has_moved() const { return has_moved_; }
-  /// Forces in the axes of the surface, those that it had in its mesh [N].
-  std::vector<geometry::Vec3> in_own_axes(std::span<const geometry::Vec3> forces) const;
+  /// Forces in the axes of the surface, which turn with it, in those of the world in the middle of the window [N].
+  std::vector<geometry::Vec3> turned(std::span<const geometry::Vec3> forces) const;
 
   template <class Archive>
   void state(Archive& archive) {

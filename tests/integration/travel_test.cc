@@ -1,4 +1,4 @@
-// Surfaces that move by themselves while they send forces: into their own frame, and past what stands.
+// Surfaces that move by themselves along what stands, while they send forces.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -23,7 +23,7 @@ using Points = std::vector<Vec3>;
 
 constexpr int windows = 20;
 
-std::string case_text(const std::string& moving, const std::string& rest = "[grains]\ncommand = [\"a\"]\n", const std::string& coupling = "") {
+std::string case_text(bool slides, const std::string& rest = "[grains]\ncommand = [\"a\"]\n", const std::string& coupling = "") {
   return fmt::format(R"(
 dimension = 3
 end = 2.0
@@ -38,7 +38,7 @@ to = "structure.inside"
 {}
 [structure]
 command = ["b"]
-{})", coupling, moving, rest);
+{})", coupling, slides ? "slides = true" : "", rest);
 }
 
 /// A plate of triangles that goes where it is told, with the forces of each window.
@@ -113,40 +113,6 @@ class Travels : public testing::Test {
   fs::path folder_;
 };
 
-// A screw: 0.7 rad a window about an axis that is nothing special, and along it.
-const Vec3 axis = Vec3(1, -2, 0.5).normalized();
-Eigen::AngleAxisd turned(double time) { return {7 * time, axis}; }
-Vec3 screwed(double time, const Vec3& point) { return Vec3(0.3, 0.1, 2) + turned(time) * (point - Vec3(0.3, 0.1, 2)) + 5 * time * axis; }
-Vec3 own_force(const Vec3& point) { return {std::sin(7 * point[0]), point[1] * point[1], -1 - point[0]}; }
-
-Blade blade_that_screws() {
-  return {stubs::square(7, true, 0.01), screwed, [](double time, const Vec3& point) -> Vec3 { return turned(time) * own_force(point); }};
-}
-
-TEST_F(Travels, InItsOwnFrameABladeFeelsTheSameForceWhereverItHasTurned) {
-  auto blade = blade_that_screws();
-  auto still = Blade(stubs::square(7, true, 0.01), [](double, const Vec3& point) { return point; }, [](double, const Vec3& point) { return own_force(point); });
-  Receiver turning, standing;
-  expect_met(run(case_text("moving = \"frame\""), blade, turning));
-  EXPECT_EQ(blade.sends(), (std::vector<std::string>{"force", "displacement"}));
-  expect_met(run(case_text(""), still, standing));
-  EXPECT_EQ(still.sends(), std::vector<std::string>{"force"}) << "who is not followed need not say where it is";
-  ASSERT_EQ(turning.got.size(), std::size_t{windows});
-  for (int k = 0; k < windows; ++k)
-    for (std::size_t n = 0; n < turning.got[k].force.size(); ++n)
-      EXPECT_LT((turning.got[k].force[n] - standing.got[k].force[n]).norm(), 1e-13) << "window " << k << ", node " << n;
-}
-
-TEST_F(Travels, TogetherForcesKeepTheirDirection) {
-  auto blade = blade_that_screws();
-  Receiver receiver;
-  expect_met(run(case_text("moving = \"together\""), blade, receiver));
-  Vec3 sent = Vec3::Zero(), came = Vec3::Zero();
-  for (const auto& point : stubs::square(7, true, 0.01).points) sent += turned(0.55) * own_force(point);
-  for (const auto& force : receiver.got[5].force) came += force;
-  EXPECT_LT((came - sent).norm(), 1e-12);
-}
-
 // A slider of a fifth of the receiver's side, under pressure while it lies on it.
 geometry::SurfaceMesh slider() {
   auto mesh = stubs::square(3, true, 0.01);
@@ -156,11 +122,26 @@ geometry::SurfaceMesh slider() {
 Vec3 slid(double time, const Vec3& point) { return point + Vec3(0.6 * time, 0.05 * time, 0); }
 Vec3 pressed(double time, const Vec3& point) { return slid(time, point)[0] >= 0 && slid(time, point)[0] <= 1 ? Vec3(0.1, -0.02, -1) : Vec3::Zero(); }
 
+Blade slider_under_pressure() { return {slider(), slid, pressed}; }
+
+// A disc of eight corners that turns on the receiver, 0.7 radians a window, about a point beside its middle. Its forces are given in axes that turn with it.
+const Vec3 pivot(0.5, 0.45, 0.01);
+geometry::SurfaceMesh octagon() {
+  geometry::SurfaceMesh mesh;
+  mesh.points.emplace_back(0.5, 0.5, 0.01);
+  for (int k = 0; k < 8; ++k) mesh.points.emplace_back(0.5 + 0.3 * std::cos(k * M_PI / 4), 0.5 + 0.3 * std::sin(k * M_PI / 4), 0.01);
+  for (std::uint32_t k = 0; k < 8; ++k) mesh.add_face(geometry::FaceKind::triangle3, std::vector<std::uint32_t>{0, k + 1, (k + 1) % 8 + 1});
+  return mesh;
+}
+Vec3 spun(double time, const Vec3& point) { return pivot + Eigen::AngleAxisd(7 * time, Vec3::UnitZ()) * (point - pivot); }
+Vec3 own_force(double, const Vec3& point) { return {std::sin(7 * point[0]), point[1] * point[1], -1 - point[0]}; }
+Blade disc_that_turns() { return {octagon(), spun, own_force}; }
+
 TEST_F(Travels, PastAReceiverTheLoadGoesWhereTheSliderIs) {
-  Blade blade(slider(), slid, pressed);
+  auto blade = slider_under_pressure();
   Receiver receiver;
-  const auto outcome = run(case_text("moving = \"past\""), blade, receiver, "past");
-  expect_met(outcome);
+  expect_met(run(case_text(true), blade, receiver, "past"));
+  EXPECT_EQ(blade.sends(), (std::vector<std::string>{"force", "displacement"}));
   const auto nodes = stubs::square(4, false).points;
   for (int k = 0; k < windows; ++k) {
     const double time = 0.1 * k + 0.05;
@@ -183,10 +164,43 @@ TEST_F(Travels, PastAReceiverTheLoadGoesWhereTheSliderIs) {
   EXPECT_LT((record.field("grains.blade", "displacement", 9)[0] - Vec3(0.6, 0.05, 0)).norm(), 1e-15);
 }
 
+TEST_F(Travels, ForcesTurnAsTheSurfaceHas) {
+  auto blade = disc_that_turns();
+  Receiver receiver;
+  expect_met(run(case_text(true), blade, receiver));
+  const auto nodes = stubs::square(4, false).points;
+  for (int k = 0; k < windows; ++k) {
+    const double time = 0.1 * k + 0.05;
+    const Eigen::AngleAxisd turn(7 * time, Vec3::UnitZ());
+    // Midway between a window's ends a point is on the chord, nearer to the pivot than on the arc.
+    const double chord = std::cos(0.35);
+    Vec3 sent = Vec3::Zero(), moment = Vec3::Zero();
+    for (const auto& point : octagon().points) {
+      const Vec3 force = turn * own_force(time, point), place = pivot + chord * (spun(time, point) - pivot);
+      sent += force;
+      moment += place.cross(force);
+    }
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      sent -= receiver.got[k].force[n];
+      moment -= nodes[n].cross(receiver.got[k].force[n]);
+    }
+    EXPECT_LT(sent.norm(), 1e-13) << k;
+    EXPECT_LT(moment.norm(), 1e-13) << k;
+  }
+}
+
+TEST_F(Travels, WhatDoesNotSlideIsNotAskedWhereItIs) {
+  auto blade = disc_that_turns();
+  Receiver receiver;
+  expect_met(run(case_text(false), blade, receiver));
+  EXPECT_EQ(blade.sends(), std::vector<std::string>{"force"});
+  EXPECT_EQ(receiver.got.front().force, receiver.got.back().force) << "in the axes of the surface nothing has changed";
+}
+
 TEST_F(Travels, ForcesBesideTheReceiverAreLostAndTheLedgerSaysSo) {
   Blade blade(slider(), slid, [](double, const Vec3&) { return Vec3(0, 0, -1); });
   Receiver receiver;
-  const auto outcome = run(case_text("moving = \"past\""), blade, receiver);
+  const auto outcome = run(case_text(true), blade, receiver);
   expect_ended(outcome, "the mapping from grains.blade to structure.inside lost 0.5 of the force in the window that ends at 0.1 s");
 }
 
@@ -200,9 +214,9 @@ TEST_F(Travels, SeveralReceiversShareTheSliderWhereItIs) {
       return {{"left", left, {}, {}, {}}, {"right", right, {}, {}, {}}};
     }
   };
-  Blade blade(slider(), slid, pressed);
+  auto blade = slider_under_pressure();
   Pair receiver;
-  auto text = case_text("moving = \"past\"");
+  auto text = case_text(true);
   text.replace(text.find("\"structure.inside\""), 18, "[\"structure.left\", \"structure.right\"]");
   expect_met(run(text, blade, receiver));
   const auto weight = [&](int window, std::size_t surface) {
@@ -218,15 +232,13 @@ TEST_F(Travels, SeveralReceiversShareTheSliderWhereItIs) {
 
 TEST_F(Travels, WhatCannotBeFollowedEndsTheRun) {
   Receiver receiver;
-  Blade soft(stubs::square(7, true, 0.01), [](double time, const Vec3& point) -> Vec3 { return point * (1 + 0.01 * time); },
-             [](double, const Vec3& point) { return own_force(point); });
-  expect_ended(run(case_text("moving = \"frame\""), soft, receiver), "grains.blade deforms by");
-  Blade fast(stubs::square(7, true, 0.01), [](double time, const Vec3& point) -> Vec3 { return Eigen::AngleAxisd(11 * time, axis) * point; },
-             [](double, const Vec3& point) { return own_force(point); });
-  expect_ended(run(case_text("moving = \"frame\""), fast, receiver), "grains.blade turns by 1.10 radians in a window");
-  auto silent = blade_that_screws();
+  Blade soft(octagon(), [](double time, const Vec3& point) -> Vec3 { return point * (1 + 0.01 * time); }, own_force);
+  expect_ended(run(case_text(true), soft, receiver), "grains.blade deforms by");
+  Blade fast(octagon(), [](double time, const Vec3& point) -> Vec3 { return Eigen::AngleAxisd(11 * time, Vec3(1, 2, 3).normalized()) * point; }, own_force);
+  expect_ended(run(case_text(true), fast, receiver), "grains.blade turns by 1.10 radians in a window");
+  auto silent = disc_that_turns();
   silent.tells = false;
-  expect_ended(run(case_text("moving = \"frame\""), silent, receiver), "did not send displacement on blade");
+  expect_ended(run(case_text(true), silent, receiver), "did not send displacement on blade");
 }
 
 TEST_F(Travels, WhatTheCaseAsksWronglyIsSaid) {
@@ -238,46 +250,45 @@ TEST_F(Travels, WhatTheCaseAsksWronglyIsSaid) {
       EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
     }
   };
-  auto two_way = case_text("moving = \"past\"");
+  auto two_way = case_text(true);
   two_way.replace(two_way.find("one-way"), 7, "explicit");
-  expect_said(two_way, "moving is for surfaces that move by themselves");
-  auto recorded = case_text("moving = \"frame\"");
+  expect_said(two_way, "slides is for surfaces that move by themselves");
+  auto recorded = case_text(true);
   recorded.erase(recorded.find("to = "), 23);
-  expect_said(recorded, "moving has a meaning for an interface with `to` only");
-  expect_said(case_text("moving = \"along\""), "moving = \"along\"");
+  expect_said(recorded, "slides has a meaning for an interface with `to` only");
 }
 
 TEST_F(Travels, AResumedRunIsBitByBitTheOneThatWasNotStopped) {
-  for (const std::string moving : {"frame", "past"}) {
-    const auto make = [&] { return moving == "frame" ? blade_that_screws() : Blade(slider(), slid, pressed); };
-    const auto text = case_text("moving = \"" + moving + "\"", "[grains]\ncommand = [\"a\"]\n", "checkpoint_every = 0.4");
+  for (const auto& [name, make] : {std::pair{"slider", &slider_under_pressure}, {"disc", &disc_that_turns}}) {
+    const auto text = case_text(true, "[grains]\ncommand = [\"a\"]\n", "checkpoint_every = 0.4");
+    const std::string whole_run = std::string(name) + "-whole", stopped_run = std::string(name) + "-stopped";
     Receiver whole, before, after;
     auto one = make(), two = make(), three = make();
-    expect_met(run(text, one, whole, moving + "-whole"));
+    expect_met(run(text, one, whole, whole_run));
     two.dies_in = 14;
-    EXPECT_EQ(run(text, two, before, moving + "-stopped").status, Status::failed);
-    expect_met(run(text, three, after, moving + "-stopped", true));
+    EXPECT_EQ(run(text, two, before, stopped_run).status, Status::failed);
+    expect_met(run(text, three, after, stopped_run, true));
     ASSERT_EQ(after.got.size(), 8u) << "from the checkpoint at 1.2 s on";
-    for (std::size_t k = 0; k < after.got.size(); ++k) EXPECT_EQ(after.got[k].force, whole.got[12 + k].force) << moving << ", window " << 12 + k;
-    const io::SeriesReader a((folder_ / (moving + "-whole") / "interface.h5").string()), b((folder_ / (moving + "-stopped") / "interface.h5").string());
+    for (std::size_t k = 0; k < after.got.size(); ++k) EXPECT_EQ(after.got[k].force, whole.got[12 + k].force) << name << ", window " << 12 + k;
+    const io::SeriesReader a((folder_ / whole_run / "interface.h5").string()), b((folder_ / stopped_run / "interface.h5").string());
     ASSERT_EQ(a.windows(), b.windows());
     for (std::size_t k = 0; k < a.windows(); ++k) EXPECT_EQ(a.field("grains.blade", "displacement", k), b.field("grains.blade", "displacement", k)) << k;
   }
 }
 
-TEST_F(Travels, ARecordOfASurfaceThatWasFollowedLoadsAsItDid) {
-  for (const std::string moving : {"frame", "past"}) {
-    auto blade = moving == "frame" ? blade_that_screws() : Blade(slider(), slid, pressed);
+TEST_F(Travels, ARecordOfASurfaceThatSlidLoadsAsItDid) {
+  for (const auto& [name, make] : {std::pair{"slider", &slider_under_pressure}, {"disc", &disc_that_turns}}) {
+    auto blade = make();
     Receiver live, played;
-    expect_met(run(case_text("moving = \"" + moving + "\""), blade, live, moving));
-    expect_met(run(case_text("moving = \"" + moving + "\"", fmt::format("[grains]\nreplay = \"{}\"\n", (folder_ / moving).string())), blade, played));
+    expect_met(run(case_text(true), blade, live, name));
+    expect_met(run(case_text(true, fmt::format("[grains]\nreplay = \"{}\"\n", (folder_ / name).string())), blade, played));
     ASSERT_EQ(live.got.size(), played.got.size());
-    for (std::size_t k = 0; k < live.got.size(); ++k) EXPECT_EQ(live.got[k].force, played.got[k].force) << moving << ", window " << k;
+    for (std::size_t k = 0; k < live.got.size(); ++k) EXPECT_EQ(live.got[k].force, played.got[k].force) << name << ", window " << k;
   }
   // What was not followed then cannot be now.
-  auto blade = blade_that_screws();
+  auto blade = disc_that_turns();
   Receiver receiver;
-  expect_met(run(case_text(""), blade, receiver, "unfollowed"));
+  expect_met(run(case_text(false), blade, receiver, "unfollowed"));
   protocol::Run again;
   again.uses = {{"blade", {}, {"force", "displacement"}}};
   coupler::Replay replay({(folder_ / "unfollowed").string(), {}, {}, {}, 0}, "grains");
