@@ -70,8 +70,8 @@ std::vector<protocol::Surface> Replay::start(const protocol::Run& run) {
     const bool speeds = played_.back().speeds;
     if (!played_.back().moves) continue;
     if (!reader_.has(full, "displacement"))
-      throw io::UserError({replay_.file, 0, 0}, fmt::format("the record holds no motion of {}. Run the case that makes it with coupling.record_motion = true, or, of a surface that moves by "
-                                                           "itself, with slides = true in its interface.", full));
+      throw io::UserError({replay_.file, 0, 0}, fmt::format("the record holds no motion of {}. Run the case that makes it with {}.", full,
+                                                            speeds ? "coupling.record_motion = true" : "slides = true in its interface"));
     const double start = from_ - replay_.at;
     surfaces_.back().displacement = motion(use.surface, "displacement", start);
     if (speeds) surfaces_.back().velocity = motion(use.surface, "velocity", start);
