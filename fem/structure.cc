@@ -396,8 +396,8 @@ Structure::Response Structure::move(const protocol::Window& window, const Vector
 protocol::Advance Structure::advance(const protocol::Window& window,
                                      const std::vector<protocol::Field>& received) {
   if (state_.due) draw();
-  const auto force = received_load(received);
   const Stopwatch solve;
+  const auto force = received_load(received);
   const auto response = body_->moves() ? move(window, force) : equilibrate(window, force);
   state_.motion.time = window.end_time();
   state_.due = is_due(window);
