@@ -95,6 +95,7 @@ class Examination {
       frames.front()[8] = 2;  // 85 a6 "acopla" 01: the first value of the map (docs/protocol.md, §9)
       stage.say_bytes(frames);
     });
+    scene("shared-memory", [this] { shared_memory(); });
     scene("refusal", [this] { refused(); });
     scene("end-of-run", [this] { dismissed(); });
     if (plan_.examines_silence) scene("silence", [this] { left_alone(); });
@@ -130,7 +131,7 @@ class Examination {
     keep();
     report_.keep("sequence");  // every answer's number is checked as it comes
     examine("windows");
-    stage.advance(1, stage.small_fields(1));
+    by_frames_ = stage.advance(1, stage.small_fields(1));
     check_fields(stage.advance(2, stage.zero_fields()));
     keep();
     examine("unknown-keys");
@@ -308,6 +309,27 @@ class Examination {
     keep();
   }
 
+  // The first windows of whole_run() once more, in another process.
+  void shared_memory() {
+    Rehearsal stage(subject_, plan_);
+    stage.hear_hello();
+    stage.say_welcome_with_memory();
+    stage.hear_interface();
+    if (!stage.shares_memory()) return report_.pass_over(rule_, "it does not say that it found it, which nobody must");
+    // Beside an array that nobody knows and that is long enough, short ones lie in memory too.
+    const auto request = [&](std::int64_t window, const Rehearsal::Fields& fields) {
+      auto message = stage.advance_request(window, fields);
+      message.arrays.push_back(protocol::Array::of("of_a_later_release", "nowhere", {1 << 16}, std::vector<std::uint8_t>(1 << 16, 1)));
+      return message;
+    };
+    stage.ask(request(0, stage.zero_fields()), Kind::advanced);
+    const auto answer = stage.ask(request(1, stage.small_fields(1)), Kind::advanced);
+    check_fields(answer);
+    if (!same_bits(by_frames_, answer))
+      throw Broken(fmt::format("computed a window otherwise from arrays in shared memory: {}", difference(by_frames_, answer)));
+    keep();
+  }
+
   void request_before_welcome() {
     Rehearsal stage(subject_, plan_);
     stage.hear_hello();
@@ -367,6 +389,7 @@ class Examination {
   std::vector<std::string> capabilities_;
   bool can_known_ = false, receives_ = false;
   std::map<std::string, std::size_t> points_of_;
+  Message by_frames_;  // the answer to window 1, without shared memory
   std::int64_t next_ = 4;  // the window after those of whole_run()
 };
 

@@ -64,12 +64,19 @@ void Rehearsal::say_welcome(bool strange, bool resumes) {
   pulse_->mark();
 }
 
+void Rehearsal::say_welcome_with_memory() {
+  hub_.send(peer_, protocol::welcome_message(plan_.run, pulse_->endpoint(), hub_.offer_memory(peer_)));
+  pulse_->mark();
+}
+
 std::vector<protocol::Surface> Rehearsal::hear_interface() {
   const auto message = hear(plan_.start_limit, "interface");
   if (message.kind == Kind::error)
     throw Broken(fmt::format("answered welcome by an error: {}", protocol::read_error(message).text));
   if (message.kind != Kind::interface) throw Broken(fmt::format("sent {} where interface was expected", protocol::name_of(message.kind)));
   surfaces_ = protocol::read_interface(message);
+  shares_memory_ = protocol::found_memory(message);
+  if (shares_memory_) hub_.use_memory(peer_);
   return surfaces_;
 }
 

@@ -70,6 +70,8 @@ class Rehearsal {
   protocol::Hello hear_hello();
   /// @param strange  adds a key that no version knows
   void say_welcome(bool strange = false, bool resumes = false);
+  /// The same, with memory to share.
+  void say_welcome_with_memory();
   std::vector<protocol::Surface> hear_interface();
   /// hello, welcome, interface
   void open(bool strange = false, bool resumes = false);
@@ -97,6 +99,7 @@ class Rehearsal {
   /// Small and different for each seed, zero along z in 2D.
   Fields small_fields(int seed) const;
   bool receives() const;
+  bool shares_memory() const { return shares_memory_; }  ///< the participant said so
 
   PulseLog& pulse() { return *pulse_; }
   /// The longest time that it took to answer an advance.
@@ -114,6 +117,7 @@ class Rehearsal {
   std::unique_ptr<PulseLog> pulse_;
   std::string peer_;
   std::vector<protocol::Surface> surfaces_;
+  bool shares_memory_ = false;
   std::uint64_t sequence_ = 0;
   std::chrono::milliseconds longest_window_{0};
 };

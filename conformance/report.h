@@ -43,6 +43,7 @@ inline constexpr std::array rules{
     Rule{"malformed", "§2", "ends with an error when bytes come that are no message"},
     Rule{"wrong-bytes", "§2", "ends with an error when an array has other bytes than its shape asks for"},
     Rule{"other-version", "§7", "ends with an error when a request is of another version"},
+    Rule{"shared-memory", "§8", "computes the same from arrays in shared memory, where it said that it found it"},
     Rule{"refusal", "§3", "ends when it is refused"},
     Rule{"end-of-run", "§3", "ends without an answer when the coupler says error"},
     Rule{"silence", "§5", "ends by itself when no ping comes for 10 s"},

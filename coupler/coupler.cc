@@ -91,8 +91,9 @@ void gather(const Case& read, const Crew& crew, const Stages& stages, Outcome& o
   outcome.participants = crew.outcomes();
   outcome.quantities = stages.quantities.last();
   if (stages.account) {
-    const auto complete = stages.account->complete();
-    outcome.windows = stages.account->rows();
+    const auto cut = stages.record->cut_short();
+    const auto complete = cut ? cut->complete : stages.account->complete();
+    outcome.windows = cut ? cut->rows : stages.account->rows();
     outcome.reached = complete == read.windows ? read.end : read.time(complete);
     outcome.seconds_windows = stages.account->seconds();
     outcome.ledgers = stages.account->ledgers();

@@ -10,7 +10,7 @@ namespace acopla::coupler {
 using geometry::Vec3;
 
 Record::Record(const Case& read, const std::string& folder, std::int64_t rows, std::int64_t resumes_after)
-    : case_(read), folder_(folder), resumes_after_(resumes_after) {
+    : case_(read), folder_(folder), resumes_after_(resumes_after), kept_{rows, resumes_after} {
   if (folder_.empty()) return;
   std::filesystem::create_directories(folder_ + "/surfaces");
   const auto file = folder_ + "/interface.h5";
@@ -53,8 +53,11 @@ void Record::write_pending() {
   if (pending_.empty()) return;
   const auto windows = std::exchange(pending_, {});  // not again where this fails
   pending_values_ = 0;
+  lost_ = true;
   for (const auto& [index, window] : windows) append(index, window);
   series_->flush();
+  lost_ = false;
+  kept_ = {kept_.rows + static_cast<std::int64_t>(windows.size()), windows.back().first + windows.back().second.ticks};
   written_ = std::chrono::steady_clock::now();
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -64,6 +65,13 @@ class Record {
   void write(std::int64_t index, const WindowRecord& window);
   void flush() { write_pending(); }
 
+  /// What is on disk: windows, and the tick at which the last of them ends.
+  struct Kept {
+    std::int64_t rows = 0, complete = 0;
+  };
+  /// Nothing unless windows were lost, as a full disk loses the last ones.
+  std::optional<Kept> cut_short() const { return lost_ ? std::optional(kept_) : std::nullopt; }
+
  private:
   void write_pending();
   void append(std::int64_t index, const WindowRecord& window);
@@ -80,6 +88,8 @@ class Record {
   std::vector<std::pair<std::int64_t, WindowRecord>> pending_;
   std::size_t pending_values_ = 0;
   std::chrono::steady_clock::time_point written_{};
+  Kept kept_;
+  bool lost_ = false;
 };
 
 }  // namespace acopla::coupler

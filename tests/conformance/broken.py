@@ -3,6 +3,7 @@
 It moves a triangle, "top", by a millimetre a newton, and remembers the sum of what it received. Without a FAULT it keeps all.
 """
 import json
+import math
 import os
 import signal
 import sys
@@ -10,6 +11,7 @@ import threading
 import time
 
 import acopla
+import msgpack
 import numpy
 import zmq
 
@@ -21,6 +23,7 @@ main.connect(os.environ["ACOPLA_ENDPOINT"])
 last_ping = time.monotonic()
 total = numpy.zeros((3, 3))
 saved = None
+memory = None  # that the coupler offers
 
 
 def send(kind, body=None, sequence=0, arrays=()):
@@ -89,11 +92,29 @@ def interface():
     if FAULT == "interface-faceless":
         nodes, kinds = nodes[:0], kinds[:0]
     name = "bottom" if FAULT == "interface-name" else "top"
-    send("interface", {"surfaces": [name]}, arrays=[("points", name, points), ("nodes", name, nodes), ("kinds", name, kinds)])
+    found = {"memory": True} if memory else {}
+    send("interface", {"surfaces": [name], **found}, arrays=[("points", name, points), ("nodes", name, nodes), ("kinds", name, kinds)])
+
+
+def with_frames(frames):
+    """Arrays that lie in shared memory (docs/protocol.md, §8) as frames, which the client reads."""
+    try:
+        header = msgpack.unpackb(frames[0])
+        entries = [entry for entry in header["arrays"] if "at" in entry]
+    except Exception:
+        return frames
+    for entry in entries:
+        size = numpy.dtype(acopla.TYPES[entry["type"]]).itemsize * math.prod(entry["shape"])
+        with open(memory["requests"], "rb") as file:
+            file.seek(entry.pop("at") + (8 if FAULT == "memory-place" else 0))
+            frames.append(file.read(size))
+    return [msgpack.packb(header), *frames[1:]] if entries else frames
 
 
 def heard():
     frames = main.recv_multipart()
+    if FAULT != "memory-blind":
+        frames = with_frames(frames)
     if FAULT == "malformed" and len(frames[0]) < 30:
         os.kill(os.getpid(), signal.SIGSEGV)
     if FAULT == "wrong-bytes" and len(frames) > 1 and len(frames[1]) < 72:
@@ -185,6 +206,7 @@ if welcome.kind != "welcome" and FAULT != "before-welcome":
     fail(f"{welcome.kind} before welcome")
 if FAULT != "pulse-never":
     threading.Thread(target=pulse, args=(welcome.body["pulse"],), daemon=True).start()
+memory = welcome.body.get("memory")
 interface()
 if FAULT == "order":
     send("done", {"values": []})
