@@ -18,7 +18,7 @@ using protocol::Message;
 
 constexpr std::chrono::milliseconds tick{100};
 constexpr auto advancing = "advancing";
-constexpr double quick = 10e-3;  // an answer in less [s]
+constexpr double soon = 3e-3;  // an answer in less [s]
 constexpr std::chrono::milliseconds look_interval{100};  // between looks after everybody, while answers come
 // An exit is often seen before the last message of the process has been read.
 constexpr std::chrono::milliseconds last_words_wait{300};
@@ -140,8 +140,12 @@ Crew::Answer Crew::next_answer() {
 // that one has used up its slice, which may be three milliseconds. So we sleep for one, unless the answer may be here by then.
 void Crew::give_way() {
   constexpr std::chrono::milliseconds pause{1};
-  const auto is_quick = [](const auto& entry) { return entry.second.phase == Member::Phase::advancing && entry.second.last_advance < quick; };
-  if (answers_.empty() && std::none_of(members_.begin(), members_.end(), is_quick)) turn(pause);
+  if (answers_.empty() && !answers_soon()) turn(pause);
+}
+
+bool Crew::answers_soon() const {
+  return std::any_of(members_.begin(), members_.end(),
+                     [](const auto& entry) { return entry.second.phase == Member::Phase::advancing && entry.second.last_advance < soon; });
 }
 
 std::vector<std::pair<std::string, double>> Crew::finish() {

@@ -79,6 +79,8 @@ class Crew {
   Answer next_answer();
   /// To be called after the last request and before work of one's own: lets it go on its way. @throws Failure, Interrupted
   void give_way();
+  /// Of those who compute one took no longer than a few milliseconds last time.
+  bool answers_soon() const;
 
   /// Ends the run well. @return what the participants report at the end, as "participant.quantity"
   std::vector<std::pair<std::string, double>> finish();

@@ -85,13 +85,16 @@ void TwoWay::state(Archive& archive) {
 template void TwoWay::state(io::StateWriter&);
 template void TwoWay::state(io::StateReader&);
 
-// The loaders compute, in the next window already, while the books of this one are kept.
+// Both sides compute while the books are kept: the loaders in the next window already, and structures that answer soon while the forces are added up.
+// Where windows are long all that waits until the loaders are under way (Crew::give_way).
 void TwoWay::step_serially(WindowRecord& window) {
   Forces forces;
   Motions end;
   if (!begun_) begin_next(window_);
   load(window, forces, end);
   begin_structures(std::move(forces));
+  const bool beside_structures = crew_.answers_soon();
+  if (beside_structures) balance(window);
   Forces none;
   gather(structures_.size(), window, none, end);
   const auto start = std::exchange(now_, std::move(end));
@@ -103,7 +106,7 @@ void TwoWay::step_serially(WindowRecord& window) {
     begin_next(next);
     crew_.give_way();
   }
-  balance(window);
+  if (!beside_structures) balance(window);
   book(window, window, start, moved_on(start, length), now_);
 }
 
