@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "coupler/case.h"

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "fem/coupled_nodes.h"
-#include "io/large_memory.h"
 #include "fem/mass_matrix.h"
 #include "fem/nodal.h"
+#include "io/large_memory.h"
 
 namespace acopla::fem {
 

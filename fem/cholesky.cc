@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/large_memory.h"
 #include "io/error.h"
+#include "io/large_memory.h"
 
 extern "C" void dgemm_(const char* transpose_a, const char* transpose_b, const int* m, const int* n,
                        const int* k, const double* alpha, const double* a, const int* lda,
